@@ -1,0 +1,79 @@
+//! Scattering at a surface. Every model works in the local shading frame: z is the shading normal, directions are
+//! unit and point away from the surface. Reflecting models look the same from both sides.
+
+use crate::math::Spectrum;
+use glam::{DVec2, DVec3};
+
+pub mod lambert;
+
+pub use lambert::Lambert;
+
+/// What a subpath carries, which decides how refraction scales it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Transport {
+    /// An eye subpath: `wo` points towards the eye; refraction scales radiance by (eta_o/eta_i)^2.
+    Radiance,
+    /// A light subpath: `wo` points towards the light; no such scale.
+    Importance,
+}
+
+/// A direction drawn from a [`Bsdf`].
+#[derive(Debug, Clone, Copy)]
+pub struct BsdfSample {
+    /// Where the path goes on, unit.
+    pub wi: DVec3,
+    /// f |cos wi| / pdf, for the transport asked for.
+    pub weight: Spectrum,
+    /// Density of `wi` given `wo`, 1/sr. For a delta lobe its probability times n^2 |cos| on the side of `wi`: the
+    /// amplitude for which densities in both directions describe the same measure.
+    pub pdf: f64,
+    /// Density of `wo` given `wi`, likewise.
+    pub pdf_rev: f64,
+    /// Drawn from a delta lobe: `eval` and `pdf` know nothing of it.
+    pub delta: bool,
+}
+
+/// A scattering model with its parameters at a point.
+#[derive(Debug, Clone, Copy)]
+pub enum Bsdf {
+    /// Diffuse reflection.
+    Lambert(Lambert),
+}
+
+impl Bsdf {
+    /// f for light that arrives from `w_light` and leaves to `w_eye`, 1/sr; 0 for delta lobes. In this form radiance
+    /// and importance see the same value.
+    pub fn eval(&self, w_eye: DVec3, w_light: DVec3) -> Spectrum {
+        match self {
+            Self::Lambert(b) => b.eval(w_eye, w_light),
+        }
+    }
+
+    /// Density of [`Bsdf::sample`] choosing `wi` given `wo`, 1/sr; without delta lobes.
+    pub fn pdf(&self, wo: DVec3, wi: DVec3) -> f64 {
+        match self {
+            Self::Lambert(b) => b.pdf(wo, wi),
+        }
+    }
+
+    /// Draws a direction; `lobe` and `u` are uniform in [0,1). `None` when the draw fell where nothing scatters.
+    pub fn sample(&self, wo: DVec3, transport: Transport, lobe: f64, u: DVec2) -> Option<BsdfSample> {
+        let _ = (transport, lobe);
+        match self {
+            Self::Lambert(b) => b.sample(wo, u),
+        }
+    }
+
+    /// True when there are only delta lobes, so that connecting to this vertex is pointless.
+    pub fn is_delta(&self) -> bool {
+        false
+    }
+
+    /// An upper bound of what is scattered on, 0..=1: the survival probability of Russian roulette. A property of the
+    /// point alone, so that both directions of a path agree on it.
+    pub fn survival(&self) -> f64 {
+        match self {
+            Self::Lambert(b) => b.survival(),
+        }
+    }
+}

@@ -1,0 +1,34 @@
+//! Hierarchical Russian Roulette for Vertex Connections [Tokuyoshi & Harada 2019]: caustics seen in extremely
+//! glossy mirrors, without bias.
+//!
+//! The modules stand in reading order, each using only what stands above it (`docs/architecture.md`).
+
+pub mod error;
+pub mod math;
+pub mod sampler;
+pub mod settings;
+
+pub mod image;
+pub mod texture;
+pub mod geometry;
+
+pub mod bsdf;
+pub mod material;
+pub mod light;
+pub mod camera;
+pub mod film;
+
+pub mod scene;
+pub mod visibility;
+
+pub mod vertex_bvh;
+pub mod roulette;
+pub mod subpath;
+pub mod mis;
+pub mod light_cache;
+pub mod connect;
+
+pub mod integrator;
+pub mod render;
+
+pub use error::{Error, Result};

@@ -1,0 +1,124 @@
+//! Counter-based random numbers, keyed by (seed, iteration, stream, index, depth, purpose).
+//!
+//! A number is a pure function of its key: the same for any thread count and order of work, and switching one
+//! technique off does not shift the numbers of another.
+
+use glam::DVec2;
+
+/// Mixes 64 bits so that every input bit reaches every output bit [Stafford 2011, variant 13].
+#[inline]
+pub fn mix(mut x: u64) -> u64 {
+    x = (x ^ (x >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    x = (x ^ (x >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+    x ^ (x >> 31)
+}
+
+/// Combines a key with one more word.
+#[inline]
+pub fn combine(key: u64, word: u64) -> u64 {
+    mix(key ^ word.wrapping_mul(0x9e37_79b9_7f4a_7c15).wrapping_add(0xd1b5_4a32_d192_ed03))
+}
+
+/// The independent families of subpaths.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[repr(u64)]
+pub enum Stream {
+    /// Light subpaths of an iteration.
+    Light = 1,
+    /// Eye subpaths (samples of pixels) of an iteration.
+    Eye = 2,
+    /// The pre-pass that measures how many vertices a light subpath leaves.
+    Pilot = 3,
+}
+
+/// What a number decides at a vertex.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[repr(u64)]
+pub enum Purpose {
+    /// Position within the pixel.
+    Raster = 0,
+    /// Position on the lens.
+    Lens,
+    /// Which emitter.
+    LightPick,
+    /// Which point of the emitter.
+    LightPoint,
+    /// Which direction from the emitter.
+    LightDirection,
+    /// Which lobe of the BSDF.
+    Lobe,
+    /// Which direction within the lobe.
+    Direction,
+    /// Whether the walk goes on.
+    Survival,
+    /// Which cached light vertex is picked.
+    CachePick,
+    /// Key of the roulette over all light vertices.
+    Roulette,
+}
+
+/// The random numbers of one subpath.
+#[derive(Debug, Clone, Copy)]
+pub struct Sampler {
+    key: u64,
+}
+
+impl Sampler {
+    /// Numbers of the subpath `index` of a stream in an iteration.
+    pub fn new(seed: u64, iteration: u64, stream: Stream, index: u64) -> Self {
+        Self { key: combine(combine(combine(seed, iteration), stream as u64), index) }
+    }
+
+    /// 64 random bits for a purpose at a depth (vertex number along the subpath).
+    #[inline]
+    pub fn bits(&self, depth: u32, purpose: Purpose) -> u64 {
+        combine(self.key, (u64::from(depth) << 8) | purpose as u64)
+    }
+
+    /// Uniform in [0,1), 53 bits.
+    #[inline]
+    pub fn u1(&self, depth: u32, purpose: Purpose) -> f64 {
+        unit(self.bits(depth, purpose))
+    }
+
+    /// Two independent uniforms in [0,1).
+    #[inline]
+    pub fn u2(&self, depth: u32, purpose: Purpose) -> DVec2 {
+        let a = self.bits(depth, purpose);
+        DVec2::new(unit(a), unit(mix(a ^ 0x6a09_e667_f3bc_c908)))
+    }
+
+    /// The `n`-th of any number of uniforms for a purpose.
+    #[inline]
+    pub fn nth(&self, depth: u32, purpose: Purpose, n: u32) -> f64 {
+        unit(combine(self.bits(depth, purpose), u64::from(n)))
+    }
+}
+
+/// The top 53 bits as a number in [0,1).
+#[inline]
+pub fn unit(bits: u64) -> f64 {
+    (bits >> 11) as f64 * (1.0 / (1u64 << 53) as f64)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn streams_and_purposes_do_not_share_numbers() {
+        let mut seen = std::collections::HashSet::new();
+        for iteration in 0..4 {
+            for stream in [Stream::Light, Stream::Eye, Stream::Pilot] {
+                for index in 0..64 {
+                    let s = Sampler::new(7, iteration, stream, index);
+                    for depth in 0..8 {
+                        for purpose in [Purpose::Raster, Purpose::Direction, Purpose::Roulette] {
+                            assert!(seen.insert(s.bits(depth, purpose)));
+                        }
+                    }
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,5 @@
+//! Random numbers that depend on what they are for, never on who asked first.
+
+pub mod counter;
+
+pub use counter::{Purpose, Sampler, Stream};

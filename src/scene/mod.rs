@@ -1,0 +1,53 @@
+//! A scene, from its files or from memory.
+
+use crate::geometry::Mesh;
+use crate::material::Material;
+use crate::settings::Settings;
+use glam::DVec3;
+use std::path::PathBuf;
+
+/// A perspective camera as a scene file gives it; world coordinates.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CameraSettings {
+    /// Centre of projection.
+    pub origin: DVec3,
+    /// A point in the middle of the image.
+    pub target: DVec3,
+    /// A direction that appears upward.
+    pub up: DVec3,
+    /// Full vertical angle, degrees.
+    pub fov_y: f64,
+    /// Lens radius, world units; 0 is a pinhole.
+    pub aperture_radius: f64,
+    /// Distance in perfect focus, world units.
+    pub focus_distance: f64,
+}
+
+/// The image as a scene file gives it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FilmSettings {
+    /// Pixels across.
+    pub width: u32,
+    /// Pixels down.
+    pub height: u32,
+    // filter: box | gaussian
+}
+
+/// Everything that is rendered.
+#[derive(Debug, Clone)]
+pub struct Scene {
+    /// The file it came from; empty when made in memory.
+    pub path: PathBuf,
+    /// All triangles.
+    pub mesh: Mesh,
+    /// The materials that [`Mesh::materials`] indexes.
+    pub materials: Vec<Material>,
+    /// The camera.
+    pub camera: CameraSettings,
+    /// The image.
+    pub film: FilmSettings,
+    /// How to render it, unless told otherwise.
+    pub settings: Settings,
+    /// What the loader wants the user to know, one sentence each.
+    pub warnings: Vec<String>,
+}
