@@ -12,6 +12,9 @@ use std::f64::consts::PI;
 /// from 62 to 5.5.
 pub const GRAZING_WIDENING: f64 = 1.5;
 
+/// Smallest GGX roughness that is told from a mirror.
+const MIN_GGX_ALPHA: f64 = 1e-9;
+
 impl Lobe {
     /// The lobe of GGX reflection at a vertex: where `wo` (unit, world space, on the side of `frame.z`) is mirrored,
     /// with the roughness that half vectors of `alpha_x`, `alpha_y` (along `frame.x`, `frame.y`) spread over
@@ -26,8 +29,8 @@ impl Lobe {
         alpha_y: f64,
         reflectance: f64,
     ) -> Self {
-        let ax = alpha_x.max(1e-9).min(1.0);
-        let ay = alpha_y.max(1e-9).min(1.0);
+        let bounded = |alpha: f64| if alpha > MIN_GGX_ALPHA { alpha.min(1.0) } else { MIN_GGX_ALPHA }; // NaN too
+        let (ax, ay) = (bounded(alpha_x), bounded(alpha_y));
         let o = frame.to_local(wo);
         let cos = o.z.max(1e-12);
         let sin = o.x.hypot(o.y);

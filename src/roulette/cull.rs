@@ -97,5 +97,6 @@ fn touches(query: &Query<'_>, number: Minimum, center: DVec3, half: DVec3) -> bo
         sum += lobe.weight() / (bound * bound);
     }
     // Some slack for the roundings of the bound itself. NaN (0/0: no bound, no weight) touches.
-    !(number.xi > query.constant * sum * (1.0 + 1e-12)) && query.constant > 0.0
+    let refused = number.xi > query.constant * sum * (1.0 + 1e-12);
+    !refused && query.constant > 0.0
 }

@@ -27,8 +27,8 @@ impl Lobe {
     /// roughness whose reflection it stands for; they are brought into [`MIN_ALPHA`]..=1. `weight` is the value on
     /// the axis (scattering times cosine, 1/sr), at least 0; one that is not a finite number counts as 0.
     pub fn new(frame: Frame, alpha_x: f64, alpha_y: f64, weight: f64) -> Self {
-        // `max` first: it takes a NaN to the bound.
-        let (alpha_x, alpha_y) = (alpha_x.max(MIN_ALPHA).min(1.0), alpha_y.max(MIN_ALPHA).min(1.0));
+        let bounded = |alpha: f64| if alpha > MIN_ALPHA { alpha.min(1.0) } else { MIN_ALPHA }; // NaN too
+        let (alpha_x, alpha_y) = (bounded(alpha_x), bounded(alpha_y));
         let weight = if weight.is_finite() { weight.max(0.0) } else { 0.0 };
         let a = alpha_x.max(alpha_y);
         Self { frame, alpha_x, alpha_y, a2: a * a, inv_x: 1.0 / alpha_x, inv_y: 1.0 / alpha_y, weight }

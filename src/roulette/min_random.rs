@@ -129,7 +129,7 @@ impl MinimumRandom {
     /// two is chosen when `(low 32 bits * (n_0 + n_1)) >> 32 < n_0`, and so on for more.
     pub fn split(self, parent: Minimum, bits: u64, counts: &[u32], out: &mut [Minimum]) {
         let total: u64 = counts.iter().map(|&n| u64::from(n)).sum();
-        let mut ticket = (u128::from(bits) * u128::from(total) >> 64) as u64;
+        let mut ticket = ((u128::from(bits) * u128::from(total)) >> 64) as u64;
         let mut chosen = false;
         for (child, (&count, out)) in counts.iter().zip(out).enumerate() {
             if !chosen && ticket < u64::from(count) {
