@@ -68,6 +68,16 @@ impl VertexBvh {
         let keys = &mut self.scratch.keys;
         keys.clear();
         keys.par_extend(positions.par_iter().enumerate().map(|(i, &p)| (grid.key(p), i as u32)));
+        if std::env::var("KD").is_ok() {
+            let t = std::time::Instant::now();
+            let mut points: Vec<_> = positions.iter().enumerate().map(|(i, &p)| (p, i as u32)).collect();
+            super::kd::order(&mut points);
+            for (k, p) in keys.iter_mut().zip(&points) {
+                *k = (0, p.1);
+            }
+            eprintln!("kd {:?}", t.elapsed());
+            return;
+        }
         keys.par_sort_unstable();
     }
 

@@ -7,6 +7,7 @@
 //! boxes.
 
 mod build;
+mod kd;
 mod morton;
 
 use crate::math::Aabb;
