@@ -8,7 +8,6 @@
 
 mod build;
 mod kd;
-mod morton;
 
 use crate::math::Aabb;
 use glam::Vec3;
