@@ -246,8 +246,9 @@ mod tests {
                         DVec3::new(2.0 * lx * r * angle.cos(), 2.0 * ly * r * angle.sin(), 1.0).normalize();
                     let w = f.to_world(local);
                     let fit = lobe.weight() * lobe.k(w) / f_cos_t(o, w, eta, ax, ay);
-                    // The factors beside D vary to first order: |o.h| by alpha r tan(theta).
-                    let tolerance = 3.0 * ax.max(ay) * (1.0 + r * (1.0 + theta.tan()));
+                    // What varies to first order beside D: |o.h| by alpha r tan(theta), cos_t by alpha r / cos_t.
+                    let cos2_t = 1.0 - (theta.sin() / eta).powi(2);
+                    let tolerance = 3.0 * ax.max(ay) * (1.0 + r * (theta.tan() + 1.0 / cos2_t));
                     assert!((fit - 1.0).abs() < tolerance, "{eta} {theta} {ax} {ay} {r} {angle}: {fit}");
                 }
             }
