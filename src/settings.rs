@@ -96,3 +96,17 @@ impl FromStr for Integrator {
         })
     }
 }
+
+impl Settings {
+    /// Sets one by name (stub until the table is merged).
+    pub fn set(&mut self, key: &str, value: &str) -> Result<(), String> {
+        match key {
+            "integrator" => self.integrator = value.parse()?,
+            "max_depth" => self.max_depth = value.parse().map_err(|e| format!("{key}: {e}"))?,
+            "iterations" => self.iterations = value.parse().map_err(|e| format!("{key}: {e}"))?,
+            "seed" => self.seed = value.parse().map_err(|e| format!("{key}: {e}"))?,
+            _ => return Err(format!("unknown key '{key}' in [render]")),
+        }
+        Ok(())
+    }
+}
