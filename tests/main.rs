@@ -1,1 +1,6 @@
 //! All integration tests, one binary.
+
+mod support;
+
+mod bsdf;
+mod warps;
