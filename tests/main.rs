@@ -2,3 +2,7 @@
 
 mod hard_cases;
 mod roulette;
+mod support;
+
+mod bsdf;
+mod warps;
