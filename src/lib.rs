@@ -4,6 +4,7 @@
 //! The modules stand in reading order, each using only what stands above it (`docs/architecture.md`).
 
 pub mod error;
+pub mod file;
 pub mod math;
 pub mod sampler;
 pub mod settings;
