@@ -613,17 +613,3 @@ mod tests {
         assert_eq!((s.iterations, s.time), (8, None));
     }
 }
-
-impl Settings {
-    /// Sets one by name (stub until the table is merged).
-    pub fn set(&mut self, key: &str, value: &str) -> Result<(), String> {
-        match key {
-            "integrator" => self.integrator = value.parse()?,
-            "max_depth" => self.max_depth = value.parse().map_err(|e| format!("{key}: {e}"))?,
-            "iterations" => self.iterations = value.parse().map_err(|e| format!("{key}: {e}"))?,
-            "seed" => self.seed = value.parse().map_err(|e| format!("{key}: {e}"))?,
-            _ => return Err(format!("unknown key '{key}' in [render]")),
-        }
-        Ok(())
-    }
-}

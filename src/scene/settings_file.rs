@@ -1,11 +1,11 @@
 //! The TOML file of a scene: `obj`, `[camera]`, `[film]`, `[render]`, `[material.NAME]` and `[[light]]`.
 
-use super::FilmSettings;
 use super::camera_keys::CameraKeys;
 use super::document::{At, Node, Table};
 use super::material_keys::MaterialKeys;
+use super::{FilmSettings, Filter};
 use crate::error::Result;
-use crate::settings::Settings;
+use crate::settings::{SettingError, Settings};
 
 const LIGHT_TYPES: [&str; 4] = ["point", "spot", "directional", "environment"];
 /// Pixels across or down.
@@ -64,9 +64,9 @@ fn film(table: &Table) -> Result<FilmSettings> {
         }
     }
     if let Some(node) = table.get("filter") {
-        match node.string("film.filter")? {
-            "box" => {}
-            "gaussian" => return Err(node.at.unsupported("film.filter = \"gaussian\"; only \"box\"")),
+        film.filter = match node.string("film.filter")? {
+            "box" => Filter::Box,
+            "gaussian" => Filter::Gaussian,
             other => {
                 return Err(node.at.error(format!("film.filter is \"{other}\"; it must be box or gaussian")));
             }
@@ -81,7 +81,10 @@ fn settings(table: &Table) -> Result<Settings> {
         let Some(value) = entry.node.plain() else {
             return Err(entry.node.at.error(format!("render.{} takes a single value", entry.key)));
         };
-        settings.set(&entry.key, &value).map_err(|message| entry.at.error(message))?;
+        settings.set(&entry.key, &value).map_err(|e| match e {
+            SettingError::Invalid(message) => entry.at.error(message),
+            SettingError::NotYet(message) => entry.at.unsupported(message),
+        })?;
     }
     Ok(settings)
 }
