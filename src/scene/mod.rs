@@ -30,7 +30,37 @@ pub struct FilmSettings {
     pub width: u32,
     /// Pixels down.
     pub height: u32,
-    // filter: box | gaussian
+    /// Reconstruction filter.
+    pub filter: Filter,
+}
+
+/// How a sample spreads over pixels.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Filter {
+    /// The pixel it falls in.
+    #[default]
+    Box,
+    /// A Gaussian of half a pixel's standard deviation, cut at 1.5 pixels.
+    Gaussian,
+}
+
+impl Default for CameraSettings {
+    fn default() -> Self {
+        Self {
+            origin: DVec3::new(0.0, 0.0, 1.0),
+            target: DVec3::ZERO,
+            up: DVec3::Y,
+            fov_y: 40.0,
+            aperture_radius: 0.0,
+            focus_distance: 1.0,
+        }
+    }
+}
+
+impl Default for FilmSettings {
+    fn default() -> Self {
+        Self { width: 640, height: 480, filter: Filter::Box }
+    }
 }
 
 /// Everything that is rendered.
