@@ -16,7 +16,12 @@ struct Backend {
 }
 
 const BACKENDS: &[Backend] = &[
-    Backend { name: "pure", encode_exr: pure::encode_exr, encode_png: pure::encode_png, decode: pure::decode },
+    Backend {
+        name: "pure",
+        encode_exr: pure::encode_exr,
+        encode_png: pure::encode_png,
+        decode: pure::decode,
+    },
     #[cfg(feature = "oiio")]
     Backend {
         name: "oiio",
@@ -39,7 +44,8 @@ fn picture() -> Image {
         let x = (f64::from(i) * 0.618_033_988_749_895).fract();
         ((x - 0.25) * 10f64.powf(12.0 * x - 6.0)) as f32
     };
-    let pixels = (0..width * height).map(|i| Vec3::new(value(3 * i), value(3 * i + 1), value(3 * i + 2))).collect();
+    let pixels =
+        (0..width * height).map(|i| Vec3::new(value(3 * i), value(3 * i + 1), value(3 * i + 2))).collect();
     Image { width, height, pixels }
 }
 
@@ -147,7 +153,8 @@ fn half_floats_are_read() {
     use exr::prelude::{SpecificChannels, WritableImage, f16};
     for backend in BACKENDS {
         let (_directory, path) = here("a.exr");
-        let channels = SpecificChannels::rgba(|_| (f16::from_f32(0.5), f16::ONE, f16::from_f32(1e-4), f16::ZERO));
+        let channels =
+            SpecificChannels::rgba(|_| (f16::from_f32(0.5), f16::ONE, f16::from_f32(1e-4), f16::ZERO));
         exr::prelude::Image::from_channels((3, 2), channels).write().to_file(&path).unwrap();
         let read = (backend.decode)(&path).unwrap().image;
         assert_eq!((read.width, read.height), (3, 2));
@@ -190,7 +197,10 @@ fn what_cannot_be_read_is_named() {
     let (directory, missing) = here("none.exr");
     let error = image::read(&missing).unwrap_err();
     assert_eq!(error.exit_code(), 3);
-    assert!(error.to_string().starts_with(&format!("{}: cannot read the image", missing.display())), "{error}");
+    assert!(
+        error.to_string().starts_with(&format!("{}: cannot read the image", missing.display())),
+        "{error}"
+    );
     for (name, contents) in [
         ("empty.exr", &b""[..]),
         ("text.png", b"not an image at all, but long enough to look like one"),

@@ -51,13 +51,18 @@ pub fn decode(path: &Path) -> Result<Decoded, String> {
     };
     input.close().map_err(sentence)?;
 
-    let mut found: Vec<_> = spec.attributes().iter().filter_map(|(name, v)| Some((name, value(v)?))).collect();
+    let mut found: Vec<_> =
+        spec.attributes().iter().filter_map(|(name, v)| Some((name, value(v)?))).collect();
     found.sort_by_key(|(name, _)| *name);
     let mut attributes = Attributes::new();
     for (name, value) in found {
         attributes.set(name, value);
     }
-    Ok(Decoded { image: Image { width, height, pixels: gather(&values, channels, rgb) }, display, attributes })
+    Ok(Decoded {
+        image: Image { width, height, pixels: gather(&values, channels, rgb) },
+        display,
+        attributes,
+    })
 }
 
 fn spec(image: &Image, format: PixelFormat) -> Result<ImageSpec, String> {
