@@ -6,3 +6,5 @@ mod support;
 
 mod bsdf;
 mod warps;
+mod image;
+mod settings;
