@@ -8,7 +8,8 @@ fn main() {
     if std::env::var("CARGO_CFG_TARGET_FAMILY").as_deref() != Ok("unix") {
         return;
     }
-    let mut directories: Vec<PathBuf> = std::env::var_os("DEP_EMBREE4_LIBDIR").map(PathBuf::from).into_iter().collect();
+    let mut directories: Vec<PathBuf> =
+        std::env::var_os("DEP_EMBREE4_LIBDIR").map(PathBuf::from).into_iter().collect();
     #[cfg(feature = "oiio")]
     directories.extend(openimageio());
     directories.sort();

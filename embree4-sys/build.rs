@@ -19,7 +19,8 @@ fn main() {
     let mut arguments = Vec::new();
     if let Some(root) = env::var_os("EMBREE4_ROOT").filter(|root| !root.is_empty()) {
         let root = Path::new(&root);
-        let root = root.canonicalize().unwrap_or_else(|e| panic!("EMBREE4_ROOT={}: {e}. {HELP}", root.display()));
+        let root =
+            root.canonicalize().unwrap_or_else(|e| panic!("EMBREE4_ROOT={}: {e}. {HELP}", root.display()));
         let library = library_directory(&root)
             .unwrap_or_else(|| panic!("EMBREE4_ROOT={}: no libembree4 in its lib. {HELP}", root.display()));
         println!("cargo::rustc-link-search=native={}", library.display());

@@ -53,7 +53,8 @@ fn create_beside(path: &Path) -> Result<(PathBuf, File)> {
     hidden.push(name);
     hidden.push(format!(".{}-{}.tmp", std::process::id(), COUNT.fetch_add(1, Ordering::Relaxed)));
     let temporary = destination.with_file_name(hidden);
-    let file = OpenOptions::new().write(true).create_new(true).open(&temporary).map_err(|e| explain(path, &e))?;
+    let file =
+        OpenOptions::new().write(true).create_new(true).open(&temporary).map_err(|e| explain(path, &e))?;
     Ok((temporary, file))
 }
 

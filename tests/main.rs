@@ -1,3 +1,11 @@
 //! All integration tests, one binary.
 
 mod loading;
+mod hard_cases;
+mod roulette;
+mod support;
+
+mod bsdf;
+mod warps;
+mod image;
+mod settings;

@@ -10,7 +10,10 @@ include!(concat!(env!("OUT_DIR"), "/bindings.rs"));
 
 /// What queries rely on. A header that is too old or a layout that bindgen got wrong stops the build here.
 const _: () = {
-    assert!(RTC_VERSION >= 40300 && RTC_VERSION < 50000, "Embree's headers must be of version 4.3 or a later 4");
+    assert!(
+        RTC_VERSION >= 40300 && RTC_VERSION < 50000,
+        "Embree's headers must be of version 4.3 or a later 4"
+    );
     assert!(size_of::<RTCRay>() == 48 && align_of::<RTCRay>() == 16);
     let levels = RTC_MAX_INSTANCE_LEVEL_COUNT as usize;
     // Ng, u, v, primID, geomID, instID[levels] and, where instance arrays are on, instPrimID[levels].

@@ -2,8 +2,8 @@
 
 use super::{Attributes, Decoded, Image, Value, check_size, gather, rgb_channels, tone};
 use exr::prelude::{
-    AttributeValue, Compression, Encoding, FlatSamples, Layer, LayerAttributes, LineOrder, ReadChannels, ReadLayers,
-    SpecificChannels, Text, Vec2, WritableImage,
+    AttributeValue, Compression, Encoding, FlatSamples, Layer, LayerAttributes, LineOrder, ReadChannels,
+    ReadLayers, SpecificChannels, Text, Vec2, WritableImage,
 };
 use glam::Vec3;
 use std::fs::File;
@@ -26,8 +26,11 @@ pub fn encode_exr(image: &Image, attributes: &Attributes) -> Result<Vec<u8>, Str
         };
         layer_attributes.other.insert(Text::from_slice_unchecked(name.as_bytes()), value);
     }
-    let encoding =
-        Encoding { compression: Compression::ZIP16, line_order: LineOrder::Increasing, ..Encoding::default() };
+    let encoding = Encoding {
+        compression: Compression::ZIP16,
+        line_order: LineOrder::Increasing,
+        ..Encoding::default()
+    };
     let mut bytes = Cursor::new(Vec::new());
     exr::prelude::Image::from_layer(Layer::new(size, layer_attributes, encoding, channels))
         .write()
@@ -101,7 +104,9 @@ fn decode_exr(mut file: impl BufRead + Seek) -> Result<Decoded, String> {
         .chain(&layer.attributes.other)
         .filter_map(|(name, value)| {
             let value = match value {
-                AttributeValue::Text(text) => Value::Text(String::from_utf8_lossy(text.as_slice()).into_owned()),
+                AttributeValue::Text(text) => {
+                    Value::Text(String::from_utf8_lossy(text.as_slice()).into_owned())
+                }
                 AttributeValue::I32(number) => Value::Int(*number),
                 AttributeValue::F32(number) => Value::Float(*number),
                 _ => return None,
