@@ -1,5 +1,6 @@
 //! All integration tests, one binary.
 
+mod loading;
 mod hard_cases;
 mod roulette;
 mod support;
