@@ -24,8 +24,9 @@ pub mod visibility;
 
 pub mod vertex_bvh;
 pub mod roulette;
-pub mod subpath;
+pub mod tally;
 pub mod mis;
+pub mod subpath;
 pub mod light_cache;
 pub mod connect;
 

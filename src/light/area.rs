@@ -101,6 +101,7 @@ impl Lights {
             ng: emitter.ng,
             frame: Frame::from_z(emitter.ng),
             uv,
+            barycentric: uv,
             triangle: emitter.triangle,
             error: extent * f64::from(f32::EPSILON),
         };

@@ -1,1 +1,5 @@
 //! (being written)
+
+pub mod counters;
+pub mod observer;
+
