@@ -1,6 +1,6 @@
 //! Materials: what the surface of a triangle scatters and emits.
 
-use crate::bsdf::{Bsdf, Lambert};
+use crate::bsdf::{Bsdf, Conductor, Dielectric, Lambert, Mirror, Reflectance};
 use crate::math::Spectrum;
 use crate::texture::Texture;
 use glam::DVec2;
@@ -32,20 +32,20 @@ pub enum Scattering {
         /// A texture that `albedo` is multiplied by.
         map: Option<Texture>,
     },
-    /// A metal with a GGX surface.
+    /// A metal with a smooth or GGX surface.
     Conductor {
         /// What a smooth surface reflects.
         reflectance: Reflectance,
-        /// GGX roughness along the frame's x axis, 0 < alpha <= 1.
+        /// GGX roughness along the frame's x axis, 0..=1; both 0 is smooth.
         alpha_x: f64,
-        /// GGX roughness along the frame's y axis, 0 < alpha <= 1.
+        /// GGX roughness along the frame's y axis, 0..=1.
         alpha_y: f64,
     },
     /// A transparent body with a smooth or GGX surface, entered where the front face is met.
     Dielectric {
         /// Index of refraction inside over that outside, > 0.
         ior: f64,
-        /// GGX roughness along the frame's x axis, 0..=1; both 0 is smooth, else both are more.
+        /// GGX roughness along the frame's x axis, 0..=1; both 0 is smooth.
         alpha_x: f64,
         /// GGX roughness along the frame's y axis, 0..=1.
         alpha_y: f64,
@@ -55,20 +55,6 @@ pub enum Scattering {
         /// Reflectance per channel, the same at every angle, 0..=1.
         reflectance: Spectrum,
     },
-}
-
-/// What a smooth metal reflects.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Reflectance {
-    /// Fresnel's equations for a complex index of refraction eta + i k.
-    Complex {
-        /// Real part per channel, > 0.
-        eta: Spectrum,
-        /// Imaginary part per channel, >= 0.
-        k: Spectrum,
-    },
-    /// The reflectance at normal incidence, per channel, 0..=1.
-    Normal(Spectrum),
 }
 
 impl Material {
@@ -96,7 +82,13 @@ impl Material {
                 let texel = map.lookup(uv).clamp(Spectrum::ZERO, Spectrum::ONE);
                 Bsdf::Lambert(Lambert::new(*albedo * texel))
             }
-            _ => Bsdf::Lambert(Lambert::new(Spectrum::splat(0.5))), // until bsdf is merged
+            Scattering::Conductor { reflectance, alpha_x, alpha_y } => {
+                Bsdf::Conductor(Conductor::new(*reflectance, *alpha_x, *alpha_y))
+            }
+            Scattering::Dielectric { ior, alpha_x, alpha_y } => {
+                Bsdf::Dielectric(Dielectric::new(*ior, *alpha_x, *alpha_y))
+            }
+            Scattering::Mirror { reflectance } => Bsdf::Mirror(Mirror::new(*reflectance)),
         }
     }
 }

@@ -24,7 +24,7 @@ impl Texture {
     /// The value at texture coordinates, in the image's linear units.
     pub fn lookup(&self, uv: DVec2) -> Spectrum {
         let uv = uv * self.scale + self.offset;
-        let (w, h) = (self.image.width, self.image.height);
+        let (w, h) = (self.image.width as usize, self.image.height as usize);
         let x = Axis::new(uv.x, w);
         let y = Axis::new(1.0 - uv.y, h);
         let at = |column: usize, row: usize| self.image.pixels[row * w + column].as_dvec3();

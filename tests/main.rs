@@ -1,4 +1,10 @@
 //! All integration tests, one binary.
 
+mod hard_cases;
+mod roulette;
+mod support;
+
+mod bsdf;
+mod warps;
 mod image;
 mod settings;

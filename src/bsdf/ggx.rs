@@ -39,7 +39,7 @@ impl Ggx {
     /// half vector is best given unnormalised.
     pub fn d(&self, h: DVec3) -> f64 {
         let len2 = h.length_squared();
-        if !(len2 > 0.0) {
+        if len2 == 0.0 {
             return 0.0;
         }
         let q = DVec3::new(h.x / self.alpha_x, h.y / self.alpha_y, h.z).length_squared() / len2;

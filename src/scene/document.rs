@@ -92,19 +92,17 @@ impl Table {
         convert_table(table.into_inner(), &|_| at.clone())
     }
 
-    /// Puts `other`'s values over this table's; tables are merged, everything else is replaced.
+    /// Puts `other`'s values over this table's and behind them: tables are merged, everything else is replaced.
     pub(super) fn merge(&mut self, other: Self) {
-        for entry in other.0 {
-            match self.0.iter_mut().find(|mine| mine.key == entry.key) {
-                Some(Entry { node: Node { value: Value::Table(mine), .. }, .. })
-                    if matches!(entry.node.value, Value::Table(_)) =>
-                {
-                    let Value::Table(theirs) = entry.node.value else { continue };
-                    mine.merge(theirs);
+        for mut entry in other.0 {
+            if let Some(i) = self.0.iter().position(|mine| mine.key == entry.key) {
+                let mut mine = self.0.remove(i);
+                if let (Value::Table(a), Value::Table(b)) = (&mut mine.node.value, &mut entry.node.value) {
+                    a.merge(std::mem::take(b));
+                    entry = mine;
                 }
-                Some(mine) => *mine = entry,
-                None => self.0.push(entry),
             }
+            self.0.push(entry);
         }
     }
 

@@ -1,10 +1,10 @@
 //! `[material.NAME]`: a material that takes the place of the MTL's material of that name.
 
 use super::document::{At, Entry, Node, Table};
-use super::mtl_rules::{SMOOTH, conductor};
 use super::notes::suggestion;
+use crate::bsdf::Reflectance;
 use crate::error::Result;
-use crate::material::{Material, Reflectance, Scattering};
+use crate::material::{Material, Scattering};
 use crate::math::Spectrum;
 
 const TYPES: [&str; 4] = ["diffuse", "conductor", "dielectric", "mirror"];
@@ -87,20 +87,15 @@ fn scattering(name: &str, table: &Table, kind: &Node) -> Result<Scattering> {
                     if let Some(e) = table.entries().iter().find(|e| e.key == "eta" || e.key == "k") {
                         return Err(e.at.error(format!("{} and reflectance exclude each other", e.key)));
                     }
-                    Reflectance::Normal(node.color(&what("reflectance"), 1.0)?)
+                    Reflectance::Schlick { f0: node.color(&what("reflectance"), 1.0)? }
                 }
                 None => {
-                    let (eta, k) = (need("eta")?, need("k")?);
-                    let k = k.color(&what("k"), f64::INFINITY)?;
-                    let value = eta.color(&what("eta"), f64::INFINITY)?;
-                    if value.min_element() <= 0.0 {
-                        return Err(eta.at.error(format!("{} must be positive", what("eta"))));
-                    }
-                    Reflectance::Complex { eta: value, k }
+                    let eta = need("eta")?.color(&what("eta"), f64::INFINITY)?;
+                    Reflectance::Complex { eta, k: need("k")?.color(&what("k"), f64::INFINITY)? }
                 }
             };
-            let [x, y] = alpha(need("alpha")?, &what("alpha"))?;
-            Ok(conductor(reflectance, x, y))
+            let [alpha_x, alpha_y] = alpha(need("alpha")?, &what("alpha"))?;
+            Ok(Scattering::Conductor { reflectance, alpha_x, alpha_y })
         }
         "dielectric" => {
             only(&["ior", "alpha"])?;
@@ -108,9 +103,7 @@ fn scattering(name: &str, table: &Table, kind: &Node) -> Result<Scattering> {
             if let Some(node) = table.get("ior").filter(|_| ior <= 0.0) {
                 return Err(node.at.error(format!("{} is {ior}; it must be positive", what("ior"))));
             }
-            let given = table.get("alpha").map_or(Ok([0.0; 2]), |n| alpha(n, &what("alpha")))?;
-            let smooth = given[0].max(given[1]) < SMOOTH;
-            let [alpha_x, alpha_y] = given.map(|a| if smooth { 0.0 } else { a.max(SMOOTH) });
+            let [alpha_x, alpha_y] = table.get("alpha").map_or(Ok([0.0; 2]), |n| alpha(n, &what("alpha")))?;
             Ok(Scattering::Dielectric { ior, alpha_x, alpha_y })
         }
         "mirror" => {

@@ -84,13 +84,6 @@ impl Default for FilmSettings {
     }
 }
 
-impl Default for FilmSettings {
-    /// 640 x 480.
-    fn default() -> Self {
-        Self { width: 640, height: 480 }
-    }
-}
-
 /// Everything that is rendered.
 #[derive(Debug, Clone)]
 pub struct Scene {

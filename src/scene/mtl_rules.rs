@@ -12,13 +12,11 @@
 use super::mtl::{Library, MapReference, MtlMaterial};
 use super::notes::Notes;
 use super::textures::Textures;
+use crate::bsdf::Reflectance;
 use crate::error::{Error, Result};
-use crate::material::{Material, Reflectance, Scattering};
+use crate::material::{Material, Scattering};
 use crate::math::{Spectrum, luminance};
 use std::f64::consts::TAU;
-
-/// Below this GGX roughness a surface is taken as perfectly smooth.
-pub(super) const SMOOTH: f64 = 1e-7;
 
 /// Keys that have no effect yet unless they are 0.
 const UNUSED: [(&str, &str); 3] = [("Ps", "sheen"), ("Pc", "clear coat"), ("Pcr", "clear coat roughness")];
@@ -45,11 +43,11 @@ pub(super) fn material(
     let kd = reflectance(library, m, "Kd", color(v.diffuse), notes);
     let ks = if illum >= 2 || glossy { color(v.specular) } else { Spectrum::ZERO };
     let ks = reflectance(library, m, "Ks", ks, notes);
-    let (alpha_x, alpha_y) = roughness(library, m, illum, notes);
+    let roughness = roughness(library, m, illum, notes);
 
     let glass = matches!(illum, 6 | 7) || (matches!(illum, 4 | 9) && opacity < 1.0);
     let scattering = if glass {
-        dielectric(library, m, alpha_x, alpha_y, notes)?
+        dielectric(library, m, roughness, notes)?
     } else {
         see_through(library, m, opacity, notes);
         let metal = match metalness {
@@ -59,7 +57,12 @@ pub(super) fn material(
         layers(library, m, metal, kd, ks, notes);
         if metal {
             let tint = if metalness.is_some() { kd } else { ks };
-            conductor(Reflectance::Normal(tint), alpha_x, alpha_y)
+            match roughness {
+                None => Scattering::Mirror { reflectance: tint },
+                Some((alpha_x, alpha_y)) => {
+                    Scattering::Conductor { reflectance: Reflectance::Schlick { f0: tint }, alpha_x, alpha_y }
+                }
+            }
         } else {
             diffuse(library, m, kd, textures, notes)?
         }
@@ -82,18 +85,6 @@ pub(super) fn material(
     Ok(Material { tangent_angle, emission, ..Material::new(v.name.clone(), scattering) })
 }
 
-/// A metal; perfectly smooth ones are mirrors.
-pub(super) fn conductor(reflectance: Reflectance, alpha_x: f64, alpha_y: f64) -> Scattering {
-    match reflectance {
-        Reflectance::Normal(reflectance) if alpha_x.max(alpha_y) < SMOOTH => {
-            Scattering::Mirror { reflectance }
-        }
-        _ => {
-            Scattering::Conductor { reflectance, alpha_x: alpha_x.max(SMOOTH), alpha_y: alpha_y.max(SMOOTH) }
-        }
-    }
-}
-
 /// A colour brought into 0..=1, with a remark where that changes it.
 fn reflectance(
     library: &Library,
@@ -110,31 +101,35 @@ fn reflectance(
     c.min(Spectrum::ONE)
 }
 
-fn roughness(library: &Library, m: &MtlMaterial, illum: u8, notes: &mut Notes) -> (f64, f64) {
-    let (x, y) = match (m.number("hrr_alpha_x"), m.number("hrr_alpha_y")) {
-        (Some(x), Some(y)) => (x, y),
-        (Some(a), None) | (None, Some(a)) => (a, a),
-        (None, None) => match m.number("Pr") {
-            Some(pr) => {
-                let aspect = (1.0 - 0.9 * m.number("aniso").unwrap_or(0.0).min(1.0)).sqrt();
-                (pr * pr / aspect, pr * pr * aspect)
-            }
-            None if matches!(illum, 3..=7 | 9) => (0.0, 0.0),
-            None => {
-                let alpha = (2.0 / (m.values.shininess.unwrap_or(0.0) + 2.0)).sqrt();
-                (alpha, alpha)
-            }
-        },
+/// GGX roughness along x and y; `None` where `illum` alone calls for a mirror or clear glass.
+fn roughness(library: &Library, m: &MtlMaterial, illum: u8, notes: &mut Notes) -> Option<(f64, f64)> {
+    let (x, y) = match (m.number("hrr_alpha_x"), m.number("hrr_alpha_y"), m.number("Pr")) {
+        (Some(x), Some(y), _) => (x, y),
+        (Some(a), None, _) | (None, Some(a), _) => (a, a),
+        (None, None, Some(pr)) => {
+            let aspect = (1.0 - 0.9 * m.number("aniso").unwrap_or(0.0).min(1.0)).sqrt();
+            (pr * pr / aspect, pr * pr * aspect)
+        }
+        (None, None, None) if matches!(illum, 3..=7 | 9) => return None,
+        (None, None, None) => {
+            let alpha = (2.0 / (m.values.shininess.unwrap_or(0.0) + 2.0)).sqrt();
+            (alpha, alpha)
+        }
     };
     if x.max(y) > 1.0 {
         let message = format!("material '{}': roughness ({x}, {y}) is cut to 1, the roughest", m.values.name);
-        let key = if m.number("hrr_alpha_x").is_some() { "hrr_alpha_x" } else { "Pr" };
+        let key = ["hrr_alpha_x", "hrr_alpha_y"].into_iter().find(|k| m.number(k).is_some()).unwrap_or("Pr");
         notes.add("alpha", &library.place(m, key), message);
     }
-    (x.min(1.0), y.min(1.0))
+    Some((x.min(1.0), y.min(1.0)))
 }
 
-fn dielectric(library: &Library, m: &MtlMaterial, x: f64, y: f64, notes: &mut Notes) -> Result<Scattering> {
+fn dielectric(
+    library: &Library,
+    m: &MtlMaterial,
+    roughness: Option<(f64, f64)>,
+    notes: &mut Notes,
+) -> Result<Scattering> {
     let name = &m.values.name;
     // Half of all exporters write glass without an index of refraction; that of window glass is the convention.
     let ior = m.values.optical_density.unwrap_or(1.5);
@@ -149,8 +144,7 @@ fn dielectric(library: &Library, m: &MtlMaterial, x: f64, y: f64, notes: &mut No
             format!("material '{name}': coloured glass (Tf) is not supported yet; it is taken as clear");
         notes.add("tf", &library.place(m, "Tf"), message);
     }
-    let smooth = x.max(y) < SMOOTH;
-    let [alpha_x, alpha_y] = [x, y].map(|a| if smooth { 0.0 } else { a.max(SMOOTH) });
+    let (alpha_x, alpha_y) = roughness.unwrap_or((0.0, 0.0));
     Ok(Scattering::Dielectric { ior, alpha_x, alpha_y })
 }
 

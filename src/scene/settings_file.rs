@@ -1,9 +1,9 @@
 //! The TOML file of a scene: `obj`, `[camera]`, `[film]`, `[render]`, `[material.NAME]` and `[[light]]`.
 
-use super::FilmSettings;
 use super::camera_keys::CameraKeys;
 use super::document::{At, Node, Table};
 use super::material_keys::MaterialKeys;
+use super::{FilmSettings, Filter};
 use crate::error::Result;
 use crate::settings::{SettingError, Settings};
 
@@ -64,9 +64,9 @@ fn film(table: &Table) -> Result<FilmSettings> {
         }
     }
     if let Some(node) = table.get("filter") {
-        match node.string("film.filter")? {
-            "box" => {}
-            "gaussian" => return Err(node.at.unsupported("film.filter = \"gaussian\"; only \"box\"")),
+        film.filter = match node.string("film.filter")? {
+            "box" => Filter::Box,
+            "gaussian" => Filter::Gaussian,
             other => {
                 return Err(node.at.error(format!("film.filter is \"{other}\"; it must be box or gaussian")));
             }
@@ -82,8 +82,8 @@ fn settings(table: &Table) -> Result<Settings> {
             return Err(entry.node.at.error(format!("render.{} takes a single value", entry.key)));
         };
         settings.set(&entry.key, &value).map_err(|e| match e {
-            SettingError::NotYet(message) => entry.at.unsupported(message),
             SettingError::Invalid(message) => entry.at.error(message),
+            SettingError::NotYet(message) => entry.at.unsupported(message),
         })?;
     }
     Ok(settings)
