@@ -85,7 +85,12 @@ iterations = 64
 pub fn mirror() -> Vec<File> {
     let comment = "A lamp, a brass strip, and a mirror that shows the caustic it throws on the floor";
     let toml = format!("# {comment}.\nobj = [\"scene.obj\"]\n\n{CAMERA}{}", metals_toml("1e-4"));
-    scene("caustic_mirror", with_strip(comment), &(MTL.to_owned() + &METALS.replace("{alpha_y}", "1e-4")), &toml)
+    scene(
+        "caustic_mirror",
+        with_strip(comment),
+        &(MTL.to_owned() + &METALS.replace("{alpha_y}", "1e-4")),
+        &toml,
+    )
 }
 
 /// The same with a mirror that is brushed: rougher along its height than along its width.

@@ -192,24 +192,12 @@ impl<'a> Bidirectional<'a> {
         if tally.connection(free) { value } else { Spectrum::ZERO }
     }
 
-    fn next_event(
-        &self,
-        vertex: &EyeVertex,
-        sample: &Sample,
-        clock: Clock,
-        tally: &mut Tally,
-    ) -> Spectrum {
+    fn next_event(&self, vertex: &EyeVertex, sample: &Sample, clock: Clock, tally: &mut Tally) -> Spectrum {
         self.if_visible(vertex.next_event(self.world, &self.techniques, &sample.sampler), clock, tally)
     }
 
     /// Connections to the sample's own light subpath, or to uniform picks from the cache.
-    fn connect_base(
-        &self,
-        vertex: &EyeVertex,
-        sample: &Sample,
-        clock: Clock,
-        tally: &mut Tally,
-    ) -> Spectrum {
+    fn connect_base(&self, vertex: &EyeVertex, sample: &Sample, clock: Clock, tally: &mut Tally) -> Spectrum {
         let (stored, depth) = (self.cache.len(), vertex.walk.depth);
         let picks = if self.recipe.base == Base::Uniform { self.settings.connections } else { 0 };
         let picked = (0..picks).filter(|_| stored > 0).map(|n| {

@@ -40,9 +40,7 @@ impl Recipe {
         };
         match integrator {
             Integrator::Pt => None,
-            Integrator::Lt => {
-                Some(Self { eye_subpaths: false, next_event: false, base: Base::Off, ..all })
-            }
+            Integrator::Lt => Some(Self { eye_subpaths: false, next_event: false, base: Base::Off, ..all }),
             Integrator::Bpt => Some(Self { base: Base::OwnPath, ..all }),
             Integrator::Lvc => Some(all),
             Integrator::LvcHrr | Integrator::Auto => Some(Self { roulette: true, ..all }),

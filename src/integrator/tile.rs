@@ -47,17 +47,16 @@ pub fn sample_film(
                             let pixel = u64::from(y) * u64::from(width) + u64::from(x);
                             let index = pixel * u64::from(samples) + u64::from(s);
                             let sampler = Sampler::new(seed, iteration, Stream::Eye, index);
-                            let raster =
-                                DVec2::new(x.into(), y.into()) + sampler.u2(0, Purpose::Raster);
+                            let raster = DVec2::new(x.into(), y.into()) + sampler.u2(0, Purpose::Raster);
                             let sample = Sample { raster, index, sampler };
                             film.add(raster, radiance(&sample, clock, &mut tally));
                         }
                     }
                 }
             });
-            tally.camera_rays +=
-                u64::from((left + SIDE).min(width) - left) * u64::from((top + SIDE).min(height) - top)
-                    * u64::from(samples);
+            tally.camera_rays += u64::from((left + SIDE).min(width) - left)
+                * u64::from((top + SIDE).min(height) - top)
+                * u64::from(samples);
             tally.eye_trace += seconds;
             progress((done.fetch_add(1, Ordering::Relaxed) + 1) as f64 / tiles as f64);
             tally

@@ -20,7 +20,8 @@ pub struct Progress {
 impl Progress {
     /// How much of the whole render is done, 0..=1.
     pub fn done(&self) -> f64 {
-        let by_iterations = self.iterations.map(|n| (self.iteration as f64 + self.fraction) / n.max(1) as f64);
+        let by_iterations =
+            self.iterations.map(|n| (self.iteration as f64 + self.fraction) / n.max(1) as f64);
         let by_time = self.time_limit.map(|limit| self.elapsed / limit.max(1e-9));
         by_iterations.unwrap_or(0.0).max(by_time.unwrap_or(0.0)).clamp(0.0, 1.0)
     }
@@ -67,7 +68,13 @@ mod tests {
 
     #[test]
     fn iterations_tell_what_is_left() {
-        let p = Progress { iteration: 2, iterations: Some(10), fraction: 0.5, elapsed: 5.0, ..Progress::default() };
+        let p = Progress {
+            iteration: 2,
+            iterations: Some(10),
+            fraction: 0.5,
+            elapsed: 5.0,
+            ..Progress::default()
+        };
         assert_eq!(p.done(), 0.25);
         assert_eq!(p.remaining(), Some(15.0));
     }

@@ -1,7 +1,7 @@
 //! Light subpaths.
 
-use super::walk::{Start, Walk};
 use super::World;
+use super::walk::{Start, Walk};
 use crate::sampler::{Purpose, Sampler};
 use crate::visibility::offset;
 
@@ -9,9 +9,8 @@ use crate::visibility::offset;
 /// to the first surface. `m_0` says how often the eye subpath that hits the emitter tries (0 or 1). `None` when
 /// nothing emits or nothing is met.
 pub fn emit(world: &World<'_>, sampler: &Sampler, m_0: f64) -> Option<Walk> {
-    let emitter = world
-        .lights
-        .sample_point(sampler.u1(0, Purpose::LightPick), sampler.u2(0, Purpose::LightPoint))?;
+    let emitter =
+        world.lights.sample_point(sampler.u1(0, Purpose::LightPick), sampler.u2(0, Purpose::LightPoint))?;
     let direction = emitter.sample_direction(sampler.u2(0, Purpose::LightDirection))?;
     let cos = emitter.point.ng.dot(direction).abs();
     let pdf_w = emitter.pdf_w(direction);
