@@ -4,6 +4,7 @@ use super::Integrator;
 use super::recipe::{Base, Recipe};
 use super::tile::{self, Sample};
 use crate::connect::{self, EyeVertex, Roulette, Techniques};
+use crate::error::Result;
 use crate::film::Film;
 use crate::light_cache::LightCache;
 use crate::math::Spectrum;
@@ -52,15 +53,14 @@ impl<'a> Bidirectional<'a> {
             cache: LightCache::default(),
             bvh: VertexBvh::new(),
         };
-        machine.techniques = machine.plan(samples as f64 / f64::from(settings.samples));
+        machine.techniques = machine.plan();
         machine
     }
 
     /// How often each technique tries, per eye sample.
-    fn plan(&self, pixels: f64) -> Techniques {
+    fn plan(&self) -> Techniques {
         let (recipe, n_l) = (&self.recipe, self.light_subpaths as f64);
         let eye_samples = f64::from(self.settings.samples);
-        let _ = pixels;
         // The weights must not depend on an iteration's own number of vertices, hence a pre-pass of its own numbers.
         let vertices = (n_l * self.vertices_per_subpath()).max(1.0);
         let on = |switch: bool, m: f64| if switch { m } else { 0.0 };
@@ -252,11 +252,11 @@ impl<'a> Bidirectional<'a> {
 }
 
 impl Integrator for Bidirectional<'_> {
-    fn iterate(&mut self, iteration: u64, film: &mut Film, progress: &(dyn Fn(f64) + Sync)) -> Tally {
+    fn iterate(&mut self, iteration: u64, film: &mut Film, progress: &(dyn Fn(f64) + Sync)) -> Result<Tally> {
         let mut tally = self.light_pass(iteration, film);
         if self.recipe.roulette {
             let start = Instant::now();
-            self.bvh.build(self.cache.positions());
+            self.bvh.build(self.cache.positions())?;
             tally.vertex_bvh_build += start.elapsed().as_secs_f64();
         }
         progress(LIGHT_SHARE);
@@ -266,7 +266,7 @@ impl Integrator for Bidirectional<'_> {
             self.radiance(sample, clock, tally)
         }));
         film.count_samples(u64::from(self.settings.samples));
-        tally
+        Ok(tally)
     }
 
     fn bytes(&self) -> (usize, usize) {

@@ -8,6 +8,7 @@ mod tile;
 
 pub use recipe::Recipe;
 
+use crate::error::Result;
 use crate::film::Film;
 use crate::settings::Settings;
 use crate::subpath::World;
@@ -17,7 +18,7 @@ use crate::tally::Tally;
 pub trait Integrator {
     /// Runs one iteration and adds it to the film, its samples counted. The result depends on the seed and the
     /// iteration's number alone. `progress` is told the finished fraction now and then, from any thread.
-    fn iterate(&mut self, iteration: u64, film: &mut Film, progress: &(dyn Fn(f64) + Sync)) -> Tally;
+    fn iterate(&mut self, iteration: u64, film: &mut Film, progress: &(dyn Fn(f64) + Sync)) -> Result<Tally>;
 
     /// Bytes held in the light-vertex cache and in its tree.
     fn bytes(&self) -> (usize, usize) {

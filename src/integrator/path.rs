@@ -4,6 +4,7 @@
 use super::Integrator;
 use super::tile::{self, Sample};
 use crate::bsdf::Transport;
+use crate::error::Result;
 use crate::film::Film;
 use crate::math::Spectrum;
 use crate::sampler::{Purpose, Sampler};
@@ -91,12 +92,12 @@ impl<'a> PathTracer<'a> {
 }
 
 impl Integrator for PathTracer<'_> {
-    fn iterate(&mut self, iteration: u64, film: &mut Film, progress: &(dyn Fn(f64) + Sync)) -> Tally {
+    fn iterate(&mut self, iteration: u64, film: &mut Film, progress: &(dyn Fn(f64) + Sync)) -> Result<Tally> {
         let key = (self.settings.seed, iteration, self.settings.samples);
         let tally = tile::sample_film(film, key, progress, |sample, clock, tally| {
             self.radiance(sample, clock, tally)
         });
         film.count_samples(u64::from(self.settings.samples));
-        tally
+        Ok(tally)
     }
 }
