@@ -8,3 +8,4 @@ mod bsdf;
 mod warps;
 mod image;
 mod settings;
+mod cli;
