@@ -1,5 +1,6 @@
 //! All integration tests, one binary.
 
+mod loading;
 mod hard_cases;
 mod roulette;
 mod support;
@@ -9,3 +10,4 @@ mod warps;
 mod image;
 mod settings;
 mod cli;
+mod agreement;

@@ -94,8 +94,11 @@ fn reflectance(
     notes: &mut Notes,
 ) -> Spectrum {
     if c.max_element() > 1.0 {
-        let message =
-            format!("material '{}': {key} {:?} is cut to 1, all there is to reflect", m.values.name, c);
+        let message = format!(
+            "material '{}': {key} {:?} is cut to 1, all there is to reflect",
+            m.values.name,
+            c.to_array()
+        );
         notes.add(key, &library.place(m, key), message);
     }
     c.min(Spectrum::ONE)

@@ -58,7 +58,7 @@ impl Visibility for Embree {
         // SAFETY: the scene is committed and never changed again, so any thread may ask; `query` and `arguments` have
         // the layout and alignment of the headers, which the library understands (`Device::new` compares versions).
         unsafe { sys::rtcIntersect1(self.scene.0, &mut query, &mut arguments) };
-        (query.hit.geomID != sys::RTC_INVALID_GEOMETRY_ID).then(|| Hit {
+        (query.hit.geomID != sys::RTC_INVALID_GEOMETRY_ID).then_some(Hit {
             triangle: query.hit.primID,
             u: query.hit.u,
             v: query.hit.v,
