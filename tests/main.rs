@@ -9,4 +9,5 @@ mod bsdf;
 mod warps;
 mod image;
 mod settings;
+mod cli;
 mod agreement;

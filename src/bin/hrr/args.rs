@@ -1,7 +1,7 @@
 //! The command line. The flags of a render come from the settings table, so that none can be forgotten.
 
 use crate::log::Verbosity;
-use clap::builder::{Str, ValueHint};
+use clap::builder::ValueHint;
 use clap::error::ErrorKind;
 use clap::{Arg, ArgAction, ArgMatches, value_parser};
 use hrr::settings::{Kind, Setting, SettingError, Settings, TABLE};
@@ -229,7 +229,7 @@ fn setting_arg(setting: &'static Setting) -> Arg {
         doc => format!("\n{doc}"),
     };
     let arg = Arg::new(setting.name)
-        .long(Str::from(setting.name.replace('_', "-")))
+        .long(setting.name.replace('_', "-"))
         .alias(setting.name)
         .value_name(setting.value_name)
         .help_heading(setting.heading)

@@ -41,6 +41,11 @@ pub fn run(args: &RenderArgs, log: &Log) -> Result<u8> {
     let outcome = outcome?;
 
     let mut stats = outcome.stats;
+    if stats.iterations == 0 {
+        // A black image must not take the place of a good one.
+        log.info("stopped before an iteration was finished: nothing was written");
+        return Ok(INTERRUPTED);
+    }
     stats.seconds.load = load;
     let image = outcome.film.image();
     let attributes = attributes(&scene, &settings, &stats, outcome.film.samples());
