@@ -1,6 +1,13 @@
 //! All integration tests, one binary.
 
+mod loading;
+mod hard_cases;
+mod roulette;
 mod support;
 
 mod bsdf;
 mod warps;
+mod image;
+mod settings;
+mod cli;
+mod agreement;

@@ -15,6 +15,8 @@ pub struct SurfacePoint {
     pub frame: Frame,
     /// Texture coordinates (barycentric ones where the mesh has none).
     pub uv: DVec2,
+    /// Weights of the triangle's second and third corner.
+    pub barycentric: DVec2,
     /// Triangle index.
     pub triangle: u32,
     /// How far the position and a ray tracer's idea of the triangle may lie apart, world units.
@@ -73,6 +75,7 @@ impl SurfacePoint {
             (uv, if det == 0.0 { Frame::from_z(ns) } else { Frame::from_z_tangent(ns, tangent) })
         };
         let extent = e1.abs().max(e2.abs()).max_element().max(position.abs().max_element());
-        Self { position, ng, frame, uv, triangle, error: extent * f64::from(f32::EPSILON) }
+        let barycentric = DVec2::new(u, v);
+        Self { position, ng, frame, uv, barycentric, triangle, error: extent * f64::from(f32::EPSILON) }
     }
 }

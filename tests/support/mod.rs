@@ -6,6 +6,7 @@
 
 pub mod chart;
 pub mod distribution;
+pub mod estimate;
 pub mod quadrature;
 pub mod stats;
 

@@ -1,0 +1,280 @@
+//! Intel Embree behind the [`Visibility`] trait.
+
+// One of the crate's two doors to C.
+#![allow(unsafe_code)]
+
+use super::{Hit, Ray, Visibility};
+use crate::error::{Error, Result};
+use crate::geometry::Mesh;
+use embree4_sys as sys;
+use std::ffi::CString;
+use std::{mem, ptr, slice};
+
+/// Embree silently leaves out triangles with coordinates beyond this.
+const LARGEST_COORDINATE: f32 = 1.8e18;
+
+/// A committed Embree scene of one triangle mesh.
+#[derive(Debug)]
+pub struct Embree {
+    scene: Scene,
+}
+
+impl Embree {
+    /// Builds the acceleration structure with up to `threads` threads (0: all). The mesh is copied.
+    pub fn new(mesh: &Mesh, threads: usize) -> Result<Self> {
+        mesh.validate()?;
+        if let Some(i) = mesh.positions.iter().position(|p| p.abs().max_element() > LARGEST_COORDINATE) {
+            return Err(Error::Input(format!(
+                "vertex {i} is farther than {LARGEST_COORDINATE:e} from the mesh's middle"
+            )));
+        }
+        let device = Device::new(threads)?;
+        let scene = Scene::new(&device)?;
+        if !mesh.triangles.is_empty() {
+            let geometry = Geometry::triangles(&device, mesh)?;
+            // SAFETY: geometry and scene are live and of the same device; the scene takes its own reference.
+            unsafe { sys::rtcAttachGeometry(scene.0, geometry.0) };
+            device.check("attaching the triangles")?;
+        }
+        // SAFETY: the scene is live and no other thread knows it.
+        unsafe { sys::rtcCommitScene(scene.0) };
+        // A failed commit leaves an empty scene behind and says so nowhere else.
+        device.check("building the acceleration structure")?;
+        Ok(Self { scene })
+    }
+}
+
+impl Visibility for Embree {
+    #[inline]
+    fn intersect(&self, ray: &Ray) -> Option<Hit> {
+        // SAFETY: all fields are numbers or nullable pointers.
+        let mut query: sys::RTCRayHit = unsafe { mem::zeroed() };
+        query.ray = raw(ray);
+        query.hit.geomID = sys::RTC_INVALID_GEOMETRY_ID;
+        // SAFETY: likewise; null pointers mean defaults.
+        let mut arguments: sys::RTCIntersectArguments = unsafe { mem::zeroed() };
+        arguments.flags = sys::RTC_RAY_QUERY_FLAG_INCOHERENT;
+        arguments.feature_mask = sys::RTC_FEATURE_FLAG_ALL;
+        // SAFETY: the scene is committed and never changed again, so any thread may ask; `query` and `arguments` have
+        // the layout and alignment of the headers, which the library understands (`Device::new` compares versions).
+        unsafe { sys::rtcIntersect1(self.scene.0, &mut query, &mut arguments) };
+        (query.hit.geomID != sys::RTC_INVALID_GEOMETRY_ID).then_some(Hit {
+            triangle: query.hit.primID,
+            u: query.hit.u,
+            v: query.hit.v,
+            t: query.ray.tfar,
+        })
+    }
+
+    #[inline]
+    fn occluded(&self, ray: &Ray) -> bool {
+        let mut query = raw(ray);
+        // SAFETY: all fields are numbers or nullable pointers; null means default.
+        let mut arguments: sys::RTCOccludedArguments = unsafe { mem::zeroed() };
+        arguments.flags = sys::RTC_RAY_QUERY_FLAG_INCOHERENT;
+        arguments.feature_mask = sys::RTC_FEATURE_FLAG_ALL;
+        // SAFETY: as in `intersect`.
+        unsafe { sys::rtcOccluded1(self.scene.0, &mut query, &mut arguments) };
+        // A hit is told by a distance of -inf.
+        query.tfar < 0.0
+    }
+}
+
+#[inline]
+fn raw(ray: &Ray) -> sys::RTCRay {
+    sys::RTCRay {
+        org_x: ray.origin.x,
+        org_y: ray.origin.y,
+        org_z: ray.origin.z,
+        tnear: ray.t_min,
+        dir_x: ray.direction.x,
+        dir_y: ray.direction.y,
+        dir_z: ray.direction.z,
+        time: 0.0,
+        tfar: ray.t_max,
+        mask: u32::MAX,
+        id: 0,
+        flags: 0,
+    }
+}
+
+/// An Embree device; scenes and geometries hold references of their own to it.
+struct Device(sys::RTCDevice);
+
+impl Device {
+    fn new(threads: usize) -> Result<Self> {
+        let config = CString::new(format!("threads={threads}")).expect("no zero byte inside");
+        // SAFETY: `config` lives across the call.
+        let device = Self(unsafe { sys::rtcNewDevice(config.as_ptr()) });
+        if device.0.is_null() {
+            // SAFETY: a null device asks for the error of the failed creation.
+            let code = unsafe { sys::rtcGetDeviceError(ptr::null_mut()) };
+            return Err(failure("starting", code));
+        }
+        // SAFETY: the device is live.
+        let loaded = unsafe { sys::rtcGetDeviceProperty(device.0, sys::RTC_DEVICE_PROPERTY_VERSION) };
+        check_version(loaded as i64)?;
+        Ok(device)
+    }
+
+    /// The error of this thread's calls since the last check; Embree reports it nowhere else.
+    fn check(&self, what: &str) -> Result<()> {
+        // SAFETY: the device is live.
+        match unsafe { sys::rtcGetDeviceError(self.0) } {
+            sys::RTC_ERROR_NONE => Ok(()),
+            code => Err(failure(what, code)),
+        }
+    }
+}
+
+impl Drop for Device {
+    fn drop(&mut self) {
+        if !self.0.is_null() {
+            // SAFETY: the one reference that `rtcNewDevice` returned.
+            unsafe { sys::rtcReleaseDevice(self.0) };
+        }
+    }
+}
+
+/// An Embree geometry.
+struct Geometry(sys::RTCGeometry);
+
+impl Geometry {
+    /// The mesh's triangles, copied into buffers that Embree allocates, as it may read past the last vertex.
+    fn triangles(device: &Device, mesh: &Mesh) -> Result<Self> {
+        // SAFETY: the device is live.
+        let geometry = Self(unsafe { sys::rtcNewGeometry(device.0, sys::RTC_GEOMETRY_TYPE_TRIANGLE) });
+        device.check("making a geometry")?;
+        let positions = mesh.positions.iter().map(|p| p.to_array());
+        geometry.fill(device, sys::RTC_BUFFER_TYPE_VERTEX, sys::RTC_FORMAT_FLOAT3, positions)?;
+        let triangles = mesh.triangles.iter().copied();
+        geometry.fill(device, sys::RTC_BUFFER_TYPE_INDEX, sys::RTC_FORMAT_UINT3, triangles)?;
+        // SAFETY: the geometry is live and its buffers are set.
+        unsafe { sys::rtcCommitGeometry(geometry.0) };
+        device.check("reading the triangles")?;
+        Ok(geometry)
+    }
+
+    fn fill<T: Copy>(
+        &self,
+        device: &Device,
+        kind: sys::RTCBufferType,
+        format: sys::RTCFormat,
+        items: impl ExactSizeIterator<Item = [T; 3]>,
+    ) -> Result<()> {
+        let (stride, count) = (size_of::<[T; 3]>(), items.len());
+        // SAFETY: the geometry is live; the buffer belongs to it.
+        let buffer = unsafe { sys::rtcSetNewGeometryBuffer(self.0, kind, 0, format, stride, count) };
+        device.check("allocating a buffer")?;
+        if buffer.is_null() {
+            return Err(failure("allocating a buffer", sys::RTC_ERROR_OUT_OF_MEMORY));
+        }
+        // SAFETY: Embree's buffers are 16-byte aligned, hold `count` items of `stride` bytes, and have no other user.
+        // `T` is `f32` or `u32`: any bytes are a value.
+        let target = unsafe { slice::from_raw_parts_mut(buffer.cast::<mem::MaybeUninit<[T; 3]>>(), count) };
+        for (place, item) in target.iter_mut().zip(items) {
+            place.write(item);
+        }
+        Ok(())
+    }
+}
+
+impl Drop for Geometry {
+    fn drop(&mut self) {
+        // SAFETY: the one reference that `rtcNewGeometry` returned (null is refused by Embree with an error only).
+        unsafe { sys::rtcReleaseGeometry(self.0) };
+    }
+}
+
+/// An Embree scene.
+#[derive(Debug)]
+struct Scene(sys::RTCScene);
+
+// SAFETY: a committed scene may be asked and released from any thread; nothing changes it after `Embree::new`.
+unsafe impl Send for Scene {}
+// SAFETY: as above.
+unsafe impl Sync for Scene {}
+
+impl Scene {
+    fn new(device: &Device) -> Result<Self> {
+        // SAFETY: the device is live.
+        let scene = Self(unsafe { sys::rtcNewScene(device.0) });
+        device.check("making a scene")?;
+        // SAFETY: both are live. Robust: no ray slips between two triangles that share an edge.
+        unsafe { sys::rtcSetSceneFlags(scene.0, sys::RTC_SCENE_FLAG_ROBUST) };
+        // SAFETY: as above.
+        unsafe { sys::rtcSetSceneBuildQuality(scene.0, sys::RTC_BUILD_QUALITY_HIGH) };
+        device.check("setting up the scene")?;
+        Ok(scene)
+    }
+}
+
+impl Drop for Scene {
+    fn drop(&mut self) {
+        // SAFETY: the one reference that `rtcNewScene` returned.
+        unsafe { sys::rtcReleaseScene(self.0) };
+    }
+}
+
+/// Refuses a library older than the headers that the layout of rays and hits was taken from.
+fn check_version(loaded: i64) -> Result<()> {
+    let headers = i64::from(sys::RTC_VERSION);
+    let text = |v: i64| format!("{}.{}.{}", v / 10000, v / 100 % 100, v % 100);
+    if loaded >= headers && loaded / 10000 == headers / 10000 {
+        return Ok(());
+    }
+    Err(Error::Internal(format!(
+        "the loaded Embree library is {}, but hrr was built with the headers of {}: build again, or let the loader find \
+         the right library",
+        text(loaded),
+        text(headers)
+    )))
+}
+
+fn failure(what: &str, code: sys::RTCError) -> Error {
+    let reason = match code {
+        sys::RTC_ERROR_INVALID_ARGUMENT => "invalid argument",
+        sys::RTC_ERROR_INVALID_OPERATION => "invalid operation",
+        sys::RTC_ERROR_OUT_OF_MEMORY => return Error::Memory(format!("Embree: {what}")),
+        sys::RTC_ERROR_UNSUPPORTED_CPU => "this processor is not supported",
+        sys::RTC_ERROR_CANCELLED => "cancelled",
+        _ => "unknown error",
+    };
+    Error::Internal(format!("Embree: {what}: {reason} (code {code})"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_library_older_than_the_headers_is_refused() {
+        let headers = i64::from(sys::RTC_VERSION);
+        assert!(check_version(headers).is_ok());
+        assert!(check_version(headers + 1).is_ok());
+        for loaded in [headers - 1, 31300, 50000] {
+            let message = check_version(loaded).unwrap_err().to_string();
+            assert!(message.contains(&format!("{}.", loaded / 10000)), "{message}");
+        }
+    }
+
+    #[test]
+    fn a_failed_call_is_seen_by_check() {
+        let device = Device::new(1).unwrap();
+        // SAFETY: a null scene is refused with an error.
+        unsafe { sys::rtcCommitScene(ptr::null_mut()) };
+        // The error of a call without a device belongs to none; one on a real device is kept for `check`.
+        // SAFETY: the device is live; the geometry type is invalid.
+        let geometry = unsafe { sys::rtcNewGeometry(device.0, 0x7fff) };
+        assert!(geometry.is_null());
+        assert!(matches!(device.check("test"), Err(Error::Internal(_))));
+        assert!(device.check("test").is_ok());
+    }
+
+    #[test]
+    fn coordinates_that_embree_would_drop_are_refused() {
+        let positions = vec![glam::Vec3::ZERO, glam::Vec3::X, glam::Vec3::Y * 2e18];
+        let mesh = Mesh { positions, triangles: vec![[0, 1, 2]], materials: vec![0], ..Mesh::default() };
+        assert!(matches!(Embree::new(&mesh, 1), Err(Error::Input(_))));
+    }
+}
