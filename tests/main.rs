@@ -9,3 +9,7 @@ mod bsdf;
 mod warps;
 mod image;
 mod settings;
+mod cli;
+mod agreement;
+mod determinism;
+mod mis;

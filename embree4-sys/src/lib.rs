@@ -8,6 +8,9 @@
 
 include!(concat!(env!("OUT_DIR"), "/bindings.rs"));
 
+/// The geometry number of a query that hit nothing (a macro with a cast, which bindgen leaves out).
+pub const RTC_INVALID_GEOMETRY_ID: u32 = u32::MAX;
+
 /// What queries rely on. A header that is too old or a layout that bindgen got wrong stops the build here.
 const _: () = {
     assert!(

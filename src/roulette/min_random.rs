@@ -10,8 +10,9 @@
 //! A number is a pure function of (query key, node): neither the order of traversal nor what else was culled moves
 //! it.
 
-use crate::sampler::counter::mix;
-use crate::vertex_bvh::{NodeId, WIDTH};
+use crate::sampler::counter::{mix, unit};
+use crate::vertex_bvh::{NodeId, VertexBvh, WIDTH};
+use fearless_simd::{Simd, f32x8, i32x8, mask32x8, prelude::*, u32x8};
 
 /// How siblings get their numbers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -25,7 +26,7 @@ pub enum MinimumRandom {
     Exact,
 }
 
-/// A node's number.
+/// A node's number, in the rules that need more than [`MinimumRandom::Nested`].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Minimum {
     /// Not above any leaf's number; for a leaf the number itself, in [0,1].
@@ -37,20 +38,43 @@ pub struct Minimum {
 /// The key of a node's draw.
 #[inline(always)]
 pub fn node_bits(key: u64, node: NodeId) -> u64 {
-    mix(key ^ node.word().wrapping_mul(0x9e37_79b9_7f4a_7c15))
+    mix(key ^ u64::from(node.pack()).wrapping_mul(0x9e37_79b9_7f4a_7c15))
 }
 
 /// Eight 32-bit draws out of one of 64 bits.
 #[inline(always)]
 pub fn lane_bits(bits: u64) -> [u32; WIDTH] {
     let (lo, hi) = (bits as u32, (bits >> 32) as u32);
-    std::array::from_fn(|lane| {
-        let mut x = lo.wrapping_add((lane as u32 + 1).wrapping_mul(0x9e37_79b9));
+    LANES.map(|lane| {
+        let mut x = lo.wrapping_add(lane);
         x = (x ^ (x >> 16)).wrapping_mul(0x7feb_352d) ^ hi;
         x = (x ^ (x >> 15)).wrapping_mul(0x846c_a68b);
         x ^ (x >> 16)
     })
 }
+
+/// [`lane_bits`] in a register.
+#[inline(always)]
+fn lane_bits_simd<S: Simd>(simd: S, lo: u32, hi: u32) -> u32x8<S> {
+    let mut x = u32x8::load_array_ref(simd, &LANES) + lo;
+    x = ((x ^ (x >> 16)) * 0x7feb_352d) ^ hi;
+    x = (x ^ (x >> 15)) * 0x846c_a68b;
+    x ^ (x >> 16)
+}
+
+/// Offsets that tell the lanes apart: multiples of 2^32 over the golden ratio.
+const LANES: [u32; WIDTH] = {
+    let mut lanes = [0; WIDTH];
+    let mut i = 0;
+    while i < WIDTH {
+        lanes[i] = (i as u32 + 1).wrapping_mul(0x9e37_79b9);
+        i += 1;
+    }
+    lanes
+};
+
+/// What makes the root's draw another than every node's.
+const ROOT: u64 = 0xd6e8_feb8_6659_fd93;
 
 /// Uniform in (0,1] with full relative precision down to 2^-128: a number below 1e-16 is as likely as it should be.
 fn fine_unit(bits: u64) -> f64 {
@@ -58,17 +82,17 @@ fn fine_unit(bits: u64) -> f64 {
     (bits as f64 + (mix(bits ^ 0x5851_f42d_4c95_7f2d) as f64 + 0.5) * STEP) * STEP
 }
 
-/// The strata of eight equal children: `order(r)[lane]` runs through the 56 maps x -> a x + b, a != 0, of the field
-/// of eight elements. Two lanes see every ordered pair of distinct strata equally often, which is all that a
-/// covariance can notice of a permutation.
+/// One of the 56 maps x -> a x + b, a != 0, of the field of eight elements: lane i's stratum in bits 4 i ...
+///
+/// Two lanes see every ordered pair of distinct strata equally often, which is all that a covariance can notice of
+/// a permutation.
 #[inline(always)]
-pub fn strata(bits: u32) -> [u32; WIDTH] {
-    let packed = STRATA[((u64::from(bits) * STRATA.len() as u64) >> 32) as usize];
-    std::array::from_fn(|lane| packed >> (4 * lane) & 7)
+fn strata_map(bits: u32) -> u32 {
+    STRATA[((u64::from(bits) * STRATA.len() as u64) >> 32) as usize]
 }
 
-/// The maps of [`strata`], four bits for each lane.
-pub(super) static STRATA: [u32; 56] = affine_maps();
+/// The maps of [`strata_map`].
+static STRATA: [u32; 56] = affine_maps();
 
 const fn affine_maps() -> [u32; 56] {
     let mut maps = [0; 56];
@@ -100,29 +124,11 @@ const fn times(a: u32, b: u32) -> u32 {
 impl MinimumRandom {
     /// The root's number; `leaves` at least 1.
     pub fn root(self, key: u64, leaves: f64) -> Minimum {
-        let u = fine_unit(mix(key ^ 0xd6e8_feb8_6659_fd93));
+        let u = fine_unit(mix(key ^ ROOT));
         match self {
             Self::Nested | Self::SemiStratified => Minimum { xi: u / leaves, base: 1.0 / leaves },
             Self::Exact => Minimum { xi: exact_minimum(u, leaves), base: 0.0 },
         }
-    }
-
-    /// The numbers of eight children of `capacity / 8` leaves each.
-    #[inline(always)]
-    pub fn eight(self, parent: Minimum, bits: u64, capacity: f64) -> [Minimum; WIDTH] {
-        let stratum = strata((bits >> 32) as u32);
-        let draws = lane_bits(bits);
-        let step = 1.0 / capacity;
-        std::array::from_fn(|lane| {
-            if stratum[lane] == 0 {
-                return parent;
-            }
-            let u = f64::from(draws[lane]) * (1.0 / (1u64 << 32) as f64);
-            match self {
-                Self::Nested => Minimum { xi: (f64::from(stratum[lane]) + u) * step, base: 0.0 },
-                _ => self.sibling(parent, u, capacity, capacity * (1.0 / WIDTH as f64)),
-            }
-        })
     }
 
     /// The numbers of any children: `counts` are their leaves (at least 1 each), `bits` the node's draw. Child 0 of
@@ -169,6 +175,139 @@ impl MinimumRandom {
 fn exact_minimum(v: f64, count: f64) -> f64 {
     -(v.ln() / count).exp_m1()
 }
+
+/// How the walk deals numbers to eight children of equal size.
+pub(super) trait Deal: Copy {
+    /// A node's number as it waits on the stack.
+    type Number: Copy;
+    /// Eight of them, and what the leaves need.
+    type Eight<S: Simd>;
+
+    /// The root's number.
+    fn root(self, capacity: f64) -> Self::Number;
+    /// The numbers of a node's children.
+    fn eight<S: Simd>(self, simd: S, parent: Self::Number, node: NodeId) -> Self::Eight<S>;
+    /// Lower bounds of the numbers, for culling.
+    fn bounds<S: Simd>(simd: S, eight: &Self::Eight<S>) -> f32x8<S>;
+    /// Writes the numbers of the live lanes, packed to the front of eight places.
+    fn push<S: Simd>(simd: S, out: &mut [Self::Number], eight: &Self::Eight<S>, live: u32);
+    /// The number of a vertex, in [0,1].
+    fn leaf<S: Simd>(self, eight: &Self::Eight<S>, node: NodeId, lane: usize) -> f64;
+}
+
+/// [`MinimumRandom::Nested`]. Children of equal size take the eight strata of their parent in random order; the
+/// child in the lowest inherits the number, which lies there.
+///
+/// Numbers travel in f32 without rounding: those between 8^-j/8 and 8^-j are multiples of 2^-24 8^-j, and dealing
+/// scales by powers of eight. A leaf adds a uniform offset within that cell, so that it is uniform in all its bits.
+#[derive(Clone, Copy)]
+pub(super) struct Nested {
+    pub key: u64,
+}
+
+/// The cell of the grid that a number in (0,1) lies on, from the power of eight above it.
+#[inline(always)]
+fn cell(exponent: i32) -> f64 {
+    f64::from_bits(((1023 + exponent.div_euclid(3) * 3 - 21) as u64) << 52)
+}
+
+impl Deal for Nested {
+    type Number = f32;
+    type Eight<S: Simd> = f32x8<S>;
+
+    fn root(self, capacity: f64) -> f32 {
+        let u = fine_unit(mix(self.key ^ ROOT)).min(1f64.next_down());
+        let cell = cell((u.to_bits() >> 52) as i32 - 1023);
+        ((u / cell).floor() * cell / capacity) as f32
+    }
+
+    #[inline(always)]
+    fn eight<S: Simd>(self, simd: S, parent: f32, node: NodeId) -> f32x8<S> {
+        let bits = node_bits(self.key, node);
+        let (lo, hi) = (bits as u32, (bits >> 32) as u32);
+        let shifts = u32x8::load_array_ref(simd, &[0, 4, 8, 12, 16, 20, 24, 28]);
+        let stratum = (u32x8::splat(simd, strata_map(hi)) >> shifts) & 7;
+        let draws = lane_bits_simd(simd, lo, hi);
+        let number: f32x8<S> = ((stratum << 21) | (draws >> 11)).bitcast::<i32x8<S>>().to_float();
+        let scale = (1.0 / (1u64 << 21) as f64 / VertexBvh::capacity(node.level)) as f32;
+        stratum.simd_eq(0).select(f32x8::splat(simd, parent), number * scale)
+    }
+
+    #[inline(always)]
+    fn bounds<S: Simd>(_: S, eight: &f32x8<S>) -> f32x8<S> {
+        *eight
+    }
+
+    #[inline(always)]
+    fn push<S: Simd>(simd: S, out: &mut [f32], eight: &f32x8<S>, live: u32) {
+        eight.compress(mask32x8::from_bitmask(simd, live.into())).store_slice(out);
+    }
+
+    #[inline(always)]
+    fn leaf<S: Simd>(self, eight: &f32x8<S>, node: NodeId, lane: usize) -> f64 {
+        let number = eight.as_array()[lane];
+        let rest = mix(node_bits(self.key, node) ^ (lane as u64 + 1).wrapping_mul(0x9e37_79b9_7f4a_7c15));
+        f64::from(number) + unit(rest) * cell((number.to_bits() >> 23) as i32 - 127)
+    }
+}
+
+/// A rule that carries [`Minimum`]s, dealt one by one.
+macro_rules! carried {
+    ($name:ident) => {
+        /// The rule of the same name in [`MinimumRandom`].
+        #[derive(Clone, Copy)]
+        pub(super) struct $name {
+            pub key: u64,
+        }
+
+        impl Deal for $name {
+            type Number = Minimum;
+            type Eight<S: Simd> = [Minimum; WIDTH];
+
+            fn root(self, capacity: f64) -> Minimum {
+                MinimumRandom::$name.root(self.key, capacity)
+            }
+
+            #[inline(always)]
+            fn eight<S: Simd>(self, _: S, parent: Minimum, node: NodeId) -> [Minimum; WIDTH] {
+                let bits = node_bits(self.key, node);
+                let chosen = (bits >> 61) as usize;
+                let draws = lane_bits(bits);
+                let capacity = VertexBvh::capacity(node.level);
+                let mut eight = draws.map(|draw| {
+                    let u = (f64::from(draw) + 0.5) * (1.0 / (1u64 << 32) as f64);
+                    MinimumRandom::$name.sibling(parent, u, capacity, capacity * 0.125)
+                });
+                eight[chosen] = parent;
+                eight
+            }
+
+            #[inline(always)]
+            fn bounds<S: Simd>(simd: S, eight: &[Minimum; WIDTH]) -> f32x8<S> {
+                f32x8::load_array(simd, eight.map(|m| m.xi as f32))
+            }
+
+            #[inline(always)]
+            fn push<S: Simd>(_: S, out: &mut [Minimum], eight: &[Minimum; WIDTH], mut live: u32) {
+                for out in out {
+                    if live == 0 {
+                        break;
+                    }
+                    *out = eight[live.trailing_zeros() as usize];
+                    live &= live - 1;
+                }
+            }
+
+            #[inline(always)]
+            fn leaf<S: Simd>(self, eight: &[Minimum; WIDTH], _: NodeId, lane: usize) -> f64 {
+                eight[lane].xi
+            }
+        }
+    };
+}
+
+carried!(SemiStratified);
+carried!(Exact);
 
 #[cfg(test)]
 mod tests {

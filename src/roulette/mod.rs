@@ -15,8 +15,9 @@ pub mod approximate;
 mod cull;
 pub mod lobe;
 pub mod min_random;
+mod plane;
 
-pub use cull::{query, query_brute_force};
+pub use cull::{MAX_LOBES, query, query_brute_force};
 pub use lobe::Lobe;
 pub use min_random::MinimumRandom;
 
@@ -51,9 +52,9 @@ impl<'a> Query<'a> {
 pub struct QueryCounters {
     /// Queries.
     pub queries: u64,
-    /// Inner nodes whose children were tested.
+    /// Nodes visited, inner ones and blocks of vertices: each tests up to eight things at a time.
     pub nodes: u64,
-    /// Tests of an ellipsoid against a box.
+    /// Boxes and vertices tested against a range.
     pub tests: u64,
     /// Light vertices whose probability was computed.
     pub leaves: u64,

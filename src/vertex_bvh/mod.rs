@@ -51,10 +51,16 @@ pub struct NodeId {
 }
 
 impl NodeId {
-    /// The node as one number, unique within every tree.
+    /// Level and index in 32 bits: [`MAX_VERTICES`] make 2^28 blocks.
     #[inline(always)]
-    pub fn word(self) -> u64 {
-        u64::from(self.level) << 32 | u64::from(self.index)
+    pub fn pack(self) -> u32 {
+        self.level << 28 | self.index
+    }
+
+    /// The node of [`NodeId::pack`].
+    #[inline(always)]
+    pub fn unpack(packed: u32) -> Self {
+        Self { level: packed >> 28, index: packed & ((1 << 28) - 1) }
     }
 
     /// The child in place `lane` (0..8) of an inner node.

@@ -48,8 +48,8 @@ impl Obvhs {
             .num_threads(threads)
             .build()
             .map_err(|e| Error::Internal(format!("cannot start threads: {e}")))?;
-        let tree =
-            pool.install(|| obvhs::bvh2::builder::build_bvh2(&unordered, parameters, &mut Duration::ZERO));
+        let tree = pool
+            .install(|| obvhs::bvh2::builder::build_bvh2(&unordered, parameters, &mut Duration::default()));
         let triangles = tree.primitive_indices.iter().map(|&i| unordered[i as usize]).collect();
         Ok(Self { tree: Bvh4::new(&tree), triangles })
     }
