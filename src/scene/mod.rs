@@ -24,6 +24,7 @@ mod mtl_rules;
 mod notes;
 mod obj;
 mod obj_scan;
+mod polygon;
 mod settings_file;
 mod textures;
 

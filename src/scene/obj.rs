@@ -5,6 +5,7 @@ use super::mtl::Library;
 use super::mtl_rules;
 use super::notes::{Notes, suggestion};
 use super::obj_scan::{Face, Scan, scan};
+use super::polygon::Cutter;
 use super::textures::Textures;
 use crate::error::{Error, Place, Result};
 use crate::geometry::Mesh;
@@ -30,6 +31,7 @@ pub(super) struct Gathering {
     materials: Vec<Material>,
     /// Index of the material for faces without one.
     grey: Option<u32>,
+    cutter: Cutter,
     any_normals: bool,
     any_uvs: bool,
 }
@@ -53,28 +55,24 @@ impl Gathering {
         }
 
         let header: String = (0..libraries.len()).map(|i| format!("mtllib {i}\n")).collect();
-        let options = tobj::LoadOptions { single_index: true, triangulate: true, ..Default::default() };
+        let options = tobj::LoadOptions { single_index: true, ..Default::default() };
         let (models, _) =
             tobj::load_obj_buf(&mut header.as_bytes().chain(scan.plain.as_bytes()), &options, |p| {
                 names_of(p, &libraries)
             })
             .map_err(|e| Error::scene(Place::file(path), format!("cannot be read: {e}")))?;
 
-        let file = self.files.len() as u32;
         self.files.push(path.to_owned());
-        let mut written = scan.faces.iter().flat_map(|&Face { line, corners }| {
-            std::iter::repeat_n((file, line), corners.saturating_sub(2) as usize)
-        });
+        let mut faces = scan.faces.iter();
         for tobj::Model { mesh, .. } in models {
             let material = match mesh.material_id {
                 Some(id) => first_material + id as u32,
                 None if mesh.indices.is_empty() => continue,
                 None => self.grey(),
             };
-            self.add_model(&mesh, material, path)?;
-            self.origins.extend(written.by_ref().take(mesh.indices.len() / 3));
+            self.add_model(&mesh, &mut faces, material, notes)?;
         }
-        if self.origins.len() != self.triangles.len() {
+        if faces.next().is_some() {
             return Err(Error::Internal(format!("{}: faces were lost in reading", path.display())));
         }
         Ok(())
@@ -87,11 +85,18 @@ impl Gathering {
         })
     }
 
-    fn add_model(&mut self, mesh: &tobj::Mesh, material: u32, path: &Path) -> Result<()> {
+    /// Adds one model; `faces` says how its indices fall into polygons.
+    fn add_model<'a>(
+        &mut self,
+        mesh: &tobj::Mesh,
+        faces: &mut impl Iterator<Item = &'a Face>,
+        material: u32,
+        notes: &mut Notes,
+    ) -> Result<()> {
         let base = self.positions.len();
         let count = mesh.positions.len() / 3;
         if u32::try_from(base + count).is_err() {
-            return Err(Error::Memory(format!("{}: more than 2^32 vertices", path.display())));
+            return Err(Error::Memory("the OBJ files have more than 2^32 vertices".into()));
         }
         self.positions.extend(mesh.positions.chunks_exact(3).map(DVec3::from_slice));
         self.normals.extend(mesh.normals.chunks_exact(3).map(DVec3::from_slice));
@@ -101,8 +106,30 @@ impl Gathering {
         // The scan has seen to it that a model has either all or none.
         self.normals.resize(base + count, DVec3::ZERO);
         self.uvs.resize(base + count, DVec2::ZERO);
-        let base = base as u32;
-        self.triangles.extend(mesh.indices.chunks_exact(3).map(|t| [base + t[0], base + t[1], base + t[2]]));
+
+        let file = self.files.len() as u32 - 1;
+        let mut rest = &mesh.indices[..];
+        let mut corners = Vec::new();
+        let mut cut = Vec::new();
+        while !rest.is_empty() {
+            let face = faces.next().filter(|f| f.corners as usize <= rest.len());
+            let Some(face) = face else { return Err(Error::Internal("faces were added in reading".into())) };
+            let polygon;
+            (polygon, rest) = rest.split_at(face.corners as usize);
+            corners.clear();
+            corners.extend(polygon.iter().map(|&i| self.positions[base + i as usize]));
+            cut.clear();
+            if !self.cutter.cut(&corners, &mut cut) {
+                let place = Place::line(&self.files[file as usize], face.line as usize);
+                notes.add(
+                    "polygon",
+                    &place,
+                    "the polygon crosses itself or has no area, and is cut into a fan",
+                );
+            }
+            self.triangles.extend(cut.iter().map(|t| t.map(|i| base as u32 + polygon[i as usize])));
+            self.origins.resize(self.triangles.len(), (file, face.line));
+        }
         self.uses.resize(self.triangles.len(), material);
         Ok(())
     }
@@ -129,7 +156,6 @@ impl Gathering {
             mesh.uvs = self.uvs.iter().map(|uv| uv.as_vec2()).collect();
         }
         let places = Places { origins: &self.origins, files: &self.files };
-        remark_on_concave(&mesh, &places, notes);
         drop_degenerate(&mut mesh, &places, notes);
         (mesh, self.materials)
     }
@@ -196,27 +222,6 @@ fn names_of(path: &Path, libraries: &[Library]) -> tobj::MTLLoadResult {
     let names: HashMap<_, _> =
         library.materials.iter().enumerate().map(|(i, m)| (m.values.name.clone(), i)).collect();
     Ok((library.materials.iter().map(|m| m.values.clone()).collect(), names))
-}
-
-/// Polygons are cut into fans around their first corner, which turns some of the triangles of a concave one over.
-fn remark_on_concave(mesh: &Mesh, places: &Places<'_>, notes: &mut Notes) {
-    let (mut count, mut first, mut last) = (0, None, None);
-    for t in 1..mesh.triangles.len() {
-        let same_face =
-            mesh.triangles[t][0] == mesh.triangles[t - 1][0] && places.origins[t] == places.origins[t - 1];
-        if same_face
-            && last != Some(places.origins[t])
-            && mesh.scaled_normal(t as u32 - 1).dot(mesh.scaled_normal(t as u32)) < 0.0
-        {
-            count += 1;
-            first.get_or_insert(t);
-            last = Some(places.origins[t]);
-        }
-    }
-    if let Some(first) = first {
-        let message = format!("{count} concave polygon(s), of which this is the first, are not cut properly");
-        notes.add("concave", &places.of(first), message);
-    }
 }
 
 /// Takes out triangles without area: they cannot be hit, and have no normal.

@@ -72,6 +72,7 @@ struct Scanner<'a> {
     /// Numbers of `v`, `vt` and `vn` so far.
     counts: [usize; 3],
     form: Option<Form>,
+    /// The latest `usemtl`, until a face uses it.
     material: Option<String>,
     out: Scan,
 }
@@ -218,18 +219,15 @@ impl Scanner<'_> {
             self.form = form;
             self.out.plain.push_str("g\n");
         }
-        match &self.material {
-            None => {
+        match self.material.take() {
+            Some(name) if !self.out.materials.iter().any(|(known, _)| *known == name) => {
+                self.out.materials.push((name, self.line));
+            }
+            Some(_) => {}
+            None if self.out.materials.is_empty() => {
                 self.out.bare_face.get_or_insert(self.line);
             }
-            // Only a change of material can be the first use of one.
-            Some(name) => {
-                if self.out.materials.last().is_none_or(|(last, _)| last != name)
-                    && !self.out.materials.iter().any(|(known, _)| known == name)
-                {
-                    self.out.materials.push((name.clone(), self.line));
-                }
-            }
+            None => {}
         }
         let Ok(line) = u32::try_from(self.line) else { return self.fail("the file has too many lines") };
         self.out.faces.push(Face { line, corners });
