@@ -11,3 +11,5 @@ mod image;
 mod settings;
 mod cli;
 mod agreement;
+mod determinism;
+mod mis;

@@ -1,4 +1,8 @@
 //! Intel Embree behind the [`Visibility`] trait.
+//!
+//! Embree's `f32` arithmetic finds candidates; whether one lies within the ray's interval is decided in `f64`
+//! ([`confirm`]). So no ray is stopped by the surface that it leaves or ends at, however thin, distant or large
+//! Embree's own rounding makes that surface.
 
 // One of the crate's two doors to C.
 #![allow(unsafe_code)]
@@ -7,8 +11,9 @@ use super::{Hit, Ray, Visibility};
 use crate::error::{Error, Result};
 use crate::geometry::Mesh;
 use embree4_sys as sys;
-use std::ffi::CString;
-use std::{mem, ptr, slice};
+use glam::Vec3;
+use std::ffi::{CString, c_void};
+use std::{mem, ptr};
 
 /// Embree silently leaves out triangles with coordinates beyond this.
 const LARGEST_COORDINATE: f32 = 1.8e18;
@@ -16,7 +21,17 @@ const LARGEST_COORDINATE: f32 = 1.8e18;
 /// A committed Embree scene of one triangle mesh.
 #[derive(Debug)]
 pub struct Embree {
+    // Released before the triangles that it refers to.
     scene: Scene,
+    _triangles: Box<Triangles>,
+}
+
+/// What Embree reads, and [`confirm`].
+#[derive(Debug)]
+struct Triangles {
+    /// One more than there are: Embree reads 16 bytes at a time.
+    positions: Vec<Vec3>,
+    corners: Vec<[u32; 3]>,
 }
 
 impl Embree {
@@ -28,10 +43,14 @@ impl Embree {
                 "vertex {i} is farther than {LARGEST_COORDINATE:e} from the mesh's middle"
             )));
         }
+        let mut positions = Vec::with_capacity(mesh.positions.len() + 1);
+        positions.extend_from_slice(&mesh.positions);
+        positions.push(Vec3::ZERO);
+        let triangles = Box::new(Triangles { positions, corners: mesh.triangles.clone() });
         let device = Device::new(threads)?;
         let scene = Scene::new(&device)?;
-        if !mesh.triangles.is_empty() {
-            let geometry = Geometry::triangles(&device, mesh)?;
+        if !triangles.corners.is_empty() {
+            let geometry = Geometry::new(&device, &triangles)?;
             // SAFETY: geometry and scene are live and of the same device; the scene takes its own reference.
             unsafe { sys::rtcAttachGeometry(scene.0, geometry.0) };
             device.check("attaching the triangles")?;
@@ -40,7 +59,7 @@ impl Embree {
         unsafe { sys::rtcCommitScene(scene.0) };
         // A failed commit leaves an empty scene behind and says so nowhere else.
         device.check("building the acceleration structure")?;
-        Ok(Self { scene })
+        Ok(Self { scene, _triangles: triangles })
     }
 }
 
@@ -93,8 +112,39 @@ fn raw(ray: &Ray) -> sys::RTCRay {
         time: 0.0,
         tfar: ray.t_max,
         mask: u32::MAX,
-        id: 0,
+        // Embree overwrites `tfar` with candidates; `confirm` needs the limit that was asked for.
+        id: ray.t_max.to_bits(),
         flags: 0,
+    }
+}
+
+/// Embree's question whether a candidate counts. It does when, seen in double precision, the ray crosses the triangle's
+/// plane within its interval. That it crosses inside the triangle is left to Embree: its answers for neighbours fit
+/// together, with no gap between them.
+///
+/// # Safety
+/// To be called by Embree only, for a geometry whose user data is a live [`Triangles`].
+unsafe extern "C" fn confirm(arguments: *const sys::RTCFilterFunctionNArguments) {
+    // SAFETY: Embree passes a valid pointer for the time of the call.
+    let arguments = unsafe { &*arguments };
+    debug_assert_eq!(arguments.N, 1, "only single rays are asked for");
+    // SAFETY: set by `Geometry::new` to what outlives the scene; only ever read.
+    let triangles = unsafe { &*arguments.geometryUserPtr.cast::<Triangles>() };
+    // SAFETY: for one ray the layouts are those of `RTCRay` and `RTCHit`; nothing is assumed of their alignment.
+    let (ray, triangle) = unsafe {
+        let hit = arguments.hit.cast::<sys::RTCHit>();
+        (arguments.ray.cast::<sys::RTCRay>().read_unaligned(), ptr::addr_of!((*hit).primID).read_unaligned())
+    };
+    let [a, b, c] = triangles.corners[triangle as usize].map(|v| triangles.positions[v as usize].as_dvec3());
+    let origin = Vec3::new(ray.org_x, ray.org_y, ray.org_z).as_dvec3();
+    let direction = Vec3::new(ray.dir_x, ray.dir_y, ray.dir_z).as_dvec3();
+    let normal = (b - a).cross(c - a);
+    let t = normal.dot(a - origin) / normal.dot(direction);
+    // Also false for the NaN of a triangle without area.
+    let counts = f64::from(ray.tnear) < t && t < f64::from(f32::from_bits(ray.id));
+    if !counts {
+        // SAFETY: one flag for the one ray; 0 rejects.
+        unsafe { *arguments.valid = 0 };
     }
 }
 
@@ -140,42 +190,34 @@ impl Drop for Device {
 struct Geometry(sys::RTCGeometry);
 
 impl Geometry {
-    /// The mesh's triangles, copied into buffers that Embree allocates, as it may read past the last vertex.
-    fn triangles(device: &Device, mesh: &Mesh) -> Result<Self> {
+    /// The triangles, which must outlive every scene that the geometry is attached to.
+    fn new(device: &Device, triangles: &Triangles) -> Result<Self> {
         // SAFETY: the device is live.
         let geometry = Self(unsafe { sys::rtcNewGeometry(device.0, sys::RTC_GEOMETRY_TYPE_TRIANGLE) });
         device.check("making a geometry")?;
-        let positions = mesh.positions.iter().map(|p| p.to_array());
-        geometry.fill(device, sys::RTC_BUFFER_TYPE_VERTEX, sys::RTC_FORMAT_FLOAT3, positions)?;
-        let triangles = mesh.triangles.iter().copied();
-        geometry.fill(device, sys::RTC_BUFFER_TYPE_INDEX, sys::RTC_FORMAT_UINT3, triangles)?;
-        // SAFETY: the geometry is live and its buffers are set.
-        unsafe { sys::rtcCommitGeometry(geometry.0) };
+        let share = |kind, format, data: *const c_void, count| {
+            // SAFETY: the geometry is live; `data` holds `count` items of three 4-byte numbers, the vertices with the
+            // padding that Embree asks for, and stays where it is (the caller's promise).
+            unsafe { sys::rtcSetSharedGeometryBuffer(geometry.0, kind, 0, format, data, 0, 12, count) };
+            device.check("sharing a buffer")
+        };
+        let (positions, corners) = (&triangles.positions, &triangles.corners);
+        share(
+            sys::RTC_BUFFER_TYPE_VERTEX,
+            sys::RTC_FORMAT_FLOAT3,
+            positions.as_ptr().cast(),
+            positions.len() - 1,
+        )?;
+        share(sys::RTC_BUFFER_TYPE_INDEX, sys::RTC_FORMAT_UINT3, corners.as_ptr().cast(), corners.len())?;
+        // SAFETY: the geometry is live; `confirm` takes the user data for what it is.
+        unsafe {
+            sys::rtcSetGeometryUserData(geometry.0, ptr::from_ref(triangles).cast_mut().cast());
+            sys::rtcSetGeometryIntersectFilterFunction(geometry.0, Some(confirm));
+            sys::rtcSetGeometryOccludedFilterFunction(geometry.0, Some(confirm));
+            sys::rtcCommitGeometry(geometry.0);
+        }
         device.check("reading the triangles")?;
         Ok(geometry)
-    }
-
-    fn fill<T: Copy>(
-        &self,
-        device: &Device,
-        kind: sys::RTCBufferType,
-        format: sys::RTCFormat,
-        items: impl ExactSizeIterator<Item = [T; 3]>,
-    ) -> Result<()> {
-        let (stride, count) = (size_of::<[T; 3]>(), items.len());
-        // SAFETY: the geometry is live; the buffer belongs to it.
-        let buffer = unsafe { sys::rtcSetNewGeometryBuffer(self.0, kind, 0, format, stride, count) };
-        device.check("allocating a buffer")?;
-        if buffer.is_null() {
-            return Err(failure("allocating a buffer", sys::RTC_ERROR_OUT_OF_MEMORY));
-        }
-        // SAFETY: Embree's buffers are 16-byte aligned, hold `count` items of `stride` bytes, and have no other user.
-        // `T` is `f32` or `u32`: any bytes are a value.
-        let target = unsafe { slice::from_raw_parts_mut(buffer.cast::<mem::MaybeUninit<[T; 3]>>(), count) };
-        for (place, item) in target.iter_mut().zip(items) {
-            place.write(item);
-        }
-        Ok(())
     }
 }
 

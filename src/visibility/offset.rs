@@ -1,18 +1,20 @@
 //! Where rays start and end: the one place that knows how far `f32` can be trusted.
 //!
-//! A [`SurfacePoint`] lies on its triangle to the precision of `f64`. A ray tracer works in `f32` and sees the triangle
-//! up to [`SurfacePoint::error`] away, on either side. So rays start and shadow rays end a few errors off the surface,
-//! along the geometric normal, on the side where the path goes on. The shift moves with the size of the coordinates,
-//! not with the ray's angle or length: nothing is tuned to a scene, and scaling a scene scales the shift.
+//! A [`SurfacePoint`] lies on its triangle to the precision of `f64`, and every backend decides in `f64` on which side
+//! of a triangle a ray starts. But a ray is `f32`: its origin is rounded, and its direction too, which tilts it against
+//! the surfaces it runs along. So rays start and shadow rays end a little off the surface, along the geometric normal,
+//! on the side where the path goes on. The shift follows the size of the coordinates ([`SurfacePoint::error`]), not the
+//! ray's angle or length: nothing is tuned to a scene, and scaling a scene scales the shift.
 //!
-//! What is closer to a surface than the shift (some 10^-6 of the distance to the mesh's middle) may be passed over.
+//! Of what is closer to a surface than the shift, rays that leave it know nothing.
 
 use super::Ray;
 use crate::geometry::SurfacePoint;
 use glam::DVec3;
 
-/// Shift in units of [`SurfacePoint::error`].
-const MARGIN: f64 = 4.0;
+/// Shift in units of [`SurfacePoint::error`]: 0.9 at most for the origin's rounding, and as much again for the
+/// direction's, across all of the triangle.
+const MARGIN: f64 = 2.0;
 
 /// The ray from a surface into a direction, to infinity. `direction` is unit.
 pub fn leave(point: &SurfacePoint, direction: DVec3) -> Ray {
