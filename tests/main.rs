@@ -6,6 +6,7 @@ mod roulette;
 mod support;
 
 mod bsdf;
+mod light;
 mod warps;
 mod image;
 mod settings;
