@@ -11,3 +11,5 @@ mod image;
 mod settings;
 mod cli;
 mod agreement;
+mod ray_offset;
+mod visibility;
