@@ -46,7 +46,14 @@ fn visits() {
     let points = light_vertices(1_000_000);
     let mut bvh = VertexBvh::new();
     bvh.build(&points).unwrap();
-    for (ax, ay, k) in [(1e-4, 1e-4, 1.0), (1e-4, 1e-4, 20.0), (1e-4, 1e-2, 1.0), (1e-2, 1e-2, 1.0), (1e-6, 1e-6, 1.0), (0.1, 0.1, 1.0)] {
+    for (ax, ay, k) in [
+        (1e-4, 1e-4, 1.0),
+        (1e-4, 1e-4, 20.0),
+        (1e-4, 1e-2, 1.0),
+        (1e-2, 1e-2, 1.0),
+        (1e-6, 1e-6, 1.0),
+        (0.1, 0.1, 1.0),
+    ] {
         let eyes = eye_vertices(20_000, ax, ay);
         let c = hrr::roulette::constant_for(k, 24.0, points.len());
         let queries: Vec<_> = eyes.iter().map(|e| Query::new(e.position, &e.lobes, c, e.key)).collect();

@@ -76,7 +76,7 @@ impl Techniques {
 
     /// m of the edge that leads to the light vertex's predecessor, were the light vertex an eye vertex seen from
     /// `w_eye`.
-    fn before(&self, light: &Walk, w_eye: DVec3) -> f64 {
+    pub fn before(&self, light: &Walk, w_eye: DVec3) -> f64 {
         if light.after_delta || light.vertex.bsdf.is_delta() {
             0.0
         } else if light.depth == 1 {

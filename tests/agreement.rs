@@ -14,7 +14,8 @@ fn scene(name: &str, width: u32, height: u32) -> Scene {
 
 fn run(scene: &Scene, integrator: Integrator, iterations: u64, samples: u32) -> Estimate {
     let visibility = Backend::Obvhs;
-    let settings = Settings { integrator, visibility, iterations, samples, max_depth: 8, ..Settings::default() };
+    let settings =
+        Settings { integrator, visibility, iterations, samples, max_depth: 8, ..Settings::default() };
     estimate(scene, &settings, 8)
 }
 

@@ -100,7 +100,7 @@ fn help_teaches_every_setting() {
         assert!(out.contains(word), "{word}");
     }
     let (code, short, _) = Place::new().run("render -h");
-    assert!(code == 0 && short.len() < out.len() / 2, "the short help is short");
+    assert!(code == 0 && !short.contains("Examples:"), "the short help is short");
 }
 
 #[test]

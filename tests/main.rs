@@ -6,6 +6,7 @@ mod roulette;
 mod support;
 
 mod bsdf;
+mod light;
 mod warps;
 mod image;
 mod settings;
@@ -13,3 +14,5 @@ mod cli;
 mod agreement;
 mod ray_offset;
 mod visibility;
+mod determinism;
+mod mis;

@@ -46,7 +46,8 @@ pub fn eye_vertices(n: usize, alpha_x: f64, alpha_y: f64) -> Vec<EyeVertex> {
         .map(|i| {
             let (column, row) = ((i % width) as f64, (i / width) as f64);
             let w = width as f64;
-            let position = DVec3::new((column + u(i, 6)) / w * 1.6 - 0.8, 1.0, (row + u(i, 7)) / w * 0.8 - 0.8);
+            let position =
+                DVec3::new((column + u(i, 6)) / w * 1.6 - 0.8, 1.0, (row + u(i, 7)) / w * 0.8 - 0.8);
             let wo = (eye - position).normalize();
             let lobes = [Lobe::from_ggx_reflection(&normal, wo, alpha_x, alpha_y, 1.0)];
             EyeVertex { position, lobes, key: mix(i) }
@@ -56,7 +57,9 @@ pub fn eye_vertices(n: usize, alpha_x: f64, alpha_y: f64) -> Vec<EyeVertex> {
 
 /// Processor seconds that this thread has had: what it took from its neighbours' point of view does not count.
 pub fn cpu_seconds() -> f64 {
-    let read = || std::fs::read_to_string("/proc/thread-self/schedstat").ok()?.split(' ').next()?.parse::<f64>().ok();
+    let read = || {
+        std::fs::read_to_string("/proc/thread-self/schedstat").ok()?.split(' ').next()?.parse::<f64>().ok()
+    };
     static START: std::sync::OnceLock<std::time::Instant> = std::sync::OnceLock::new();
     read().map_or_else(|| START.get_or_init(std::time::Instant::now).elapsed().as_secs_f64(), |ns| ns * 1e-9)
 }

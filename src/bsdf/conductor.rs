@@ -26,7 +26,7 @@ impl Conductor {
         match self.ggx {
             Some(ggx) if same_side(a, b) => {
                 let h = a + b;
-                self.fresnel(a, h) * (ggx.d(h) * ggx.g2_over_4_cosines(a, b))
+                self.fresnel(h) * (ggx.d(h) * ggx.g2_over_4_cosines(a, b))
             }
             _ => Spectrum::ZERO,
         }
@@ -53,16 +53,17 @@ impl Conductor {
         let pdf = self.pdf(wo, wi);
         (pdf > 0.0).then(|| BsdfSample {
             wi,
-            weight: self.fresnel(wo, wo + wi) * ggx.g2_over_g1(wo, wi),
+            weight: self.fresnel(wo + wi) * ggx.g2_over_g1(wo, wi),
             pdf,
             pdf_rev: self.pdf(wi, wo),
             delta: false,
         })
     }
 
-    /// Reflectance of the facet with normal `h` (any length).
-    fn fresnel(&self, w: DVec3, h: DVec3) -> Spectrum {
-        self.reflectance.at(w.dot(h) / h.length())
+    /// Reflectance of the facet with the unnormalised half vector `h`: its length is twice the cosine, and the same
+    /// from both sides to the last bit.
+    fn fresnel(&self, h: DVec3) -> Spectrum {
+        self.reflectance.at(0.5 * h.length())
     }
 
     pub(super) fn is_delta(&self) -> bool {

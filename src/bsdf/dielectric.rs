@@ -23,7 +23,8 @@ struct Facet {
     d: f64,
     /// How much of the light it sends that way: F or 1 - F.
     share: f64,
-    /// 4 |cos(wo, m)| dm/dwi / n_i^2, the factor that `f` and `pdf` share; the same with both directions exchanged.
+    /// 4 |cos(wo, m)| dm/dwi, over n_i^2 for refraction: the factor that `f` and `pdf` share, and the same with both
+    /// directions exchanged.
     spread: f64,
 }
 
@@ -59,7 +60,8 @@ impl Dielectric {
         }
         if reflects(wo, wi) {
             let h = wo + wi;
-            let cos = (wo.dot(h) / h.length()).clamp(0.0, 1.0);
+            // |wo + wi| is twice the cosine, and the same from both sides to the last bit.
+            let cos = (0.5 * h.length()).min(1.0);
             let share = fresnel::dielectric(cos, self.eta_across(wo)).0;
             return Some(Facet { d: ggx.d(h), share, spread: 1.0 });
         }
@@ -71,8 +73,8 @@ impl Dielectric {
         if !(cos_o > 0.0 && cos_i > 0.0) {
             return None;
         }
-        let fresnel = fresnel::dielectric_from_cosines(cos_o, cos_i, self.eta_across(wo));
-        Some(Facet { d: ggx.d(h), share: 1.0 - fresnel, spread: 4.0 * (cos_o / len2) * (cos_i / len2) })
+        let share = fresnel::transmittance_from_cosines(cos_o, cos_i, self.eta_across(wo));
+        Some(Facet { d: ggx.d(h), share, spread: 4.0 * (cos_o / len2) * (cos_i / len2) })
     }
 
     pub(super) fn eval(&self, w_eye: DVec3, w_light: DVec3) -> Spectrum {
@@ -104,13 +106,18 @@ impl Dielectric {
         let m = ggx.sample_visible(wo * side, u).normalize() * side;
         let cos_o = wo.dot(m).clamp(0.0, 1.0);
         let eta = self.eta_across(wo);
-        let wi = match fresnel::dielectric(cos_o, eta) {
-            (f, Some(cos_t)) if lobe >= f => (m * (cos_o / eta - cos_t) - wo / eta).normalize(),
-            _ => (m * (2.0 * cos_o) - wo).normalize(),
+        let (wi, facet_reflects) = match fresnel::dielectric(cos_o, eta) {
+            (f, Some(cos_t)) if lobe >= f => (m * (cos_o / eta - cos_t) - wo / eta, false),
+            _ => (m * (2.0 * cos_o) - wo, true),
         };
+        let wi = wi.normalize();
+        // A tilted facet may reflect into the surface or refract back out of it: masked, and not the other lobe.
+        if reflects(wo, wi) != facet_reflects {
+            return None;
+        }
         // Value and density are those of the direction as rounded, not of the normal it came from.
         let pdf = self.pdf(wo, wi);
-        let scale = if reflects(wo, wi) { 1.0 } else { self.refraction_scale(wo, transport) };
+        let scale = if facet_reflects { 1.0 } else { self.refraction_scale(wo, transport) };
         (pdf > 0.0).then(|| BsdfSample {
             wi,
             weight: Spectrum::splat(scale * ggx.g2_over_g1(wo, wi)),

@@ -26,6 +26,16 @@ pub fn dielectric_from_cosines(cos_i: f64, cos_t: f64, eta: f64) -> f64 {
     0.5 * ((s / s_sum).powi(2) + (p / p_sum).powi(2))
 }
 
+/// 1 - [`dielectric_from_cosines`] without cancelling: the share that is refracted. The cosines may both be scaled by
+/// the same factor above 0.
+pub fn transmittance_from_cosines(cos_i: f64, cos_t: f64, eta: f64) -> f64 {
+    let (s, p) = (cos_i + eta * cos_t, eta * cos_i + cos_t);
+    if s <= 0.0 || p <= 0.0 {
+        return 0.0;
+    }
+    2.0 * eta * ((cos_i / s) * (cos_t / s) + (cos_i / p) * (cos_t / p))
+}
+
 /// Reflectance of a metal of complex index `eta + i k` (relative to the medium outside) for unpolarised light, 0..=1;
 /// `cos_i` in 0..=1.
 pub fn conductor(cos_i: f64, eta: f64, k: f64) -> f64 {
@@ -127,6 +137,8 @@ mod tests {
                 let error = 1e-15 / c.max(1e-8);
                 assert!((cos_i.unwrap_or(0.0) - c).abs() < error, "{eta} {c} {cos_i:?}");
                 assert!((f - back).abs() < error * 10.0 / (eta - 1.0).sqrt(), "{eta} {c} {f} {back}");
+                let refracted = transmittance_from_cosines(2.0 * c, 2.0 * cos_t.unwrap(), eta);
+                assert!((f + refracted - 1.0).abs() < 1e-15, "{eta} {c} {f} {refracted}");
                 let same = dielectric_from_cosines(cos_t.unwrap(), c, 1.0 / eta);
                 assert!((f - same).abs() < 1e-15 * (1.0 + 1.0 / (eta - 1.0)), "{eta} {c} {f} {same}");
             }

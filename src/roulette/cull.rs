@@ -15,7 +15,12 @@ const STACK: usize = MAX_LEVELS * WIDTH + WIDTH;
 
 /// Visits every accepted light vertex: its index into the positions given to [`VertexBvh::build`], and its
 /// probability P. The set, the probabilities and their order are the same on every machine and thread.
-pub fn query(bvh: &VertexBvh, query: &Query<'_>, stats: &mut QueryCounters, visit: &mut impl FnMut(u32, f64)) {
+pub fn query(
+    bvh: &VertexBvh,
+    query: &Query<'_>,
+    stats: &mut QueryCounters,
+    visit: &mut impl FnMut(u32, f64),
+) {
     start(bvh, query, true, stats, visit);
 }
 

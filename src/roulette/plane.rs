@@ -112,11 +112,7 @@ impl<S: Simd> Vec8<S> {
     /// The point of the boxes nearest to a point, by components.
     #[inline(always)]
     fn clamp(self, lo: Self, hi: Self) -> Self {
-        Self {
-            x: self.x.max(lo.x).min(hi.x),
-            y: self.y.max(lo.y).min(hi.y),
-            z: self.z.max(lo.z).min(hi.z),
-        }
+        Self { x: self.x.max(lo.x).min(hi.x), y: self.y.max(lo.y).min(hi.y), z: self.z.max(lo.z).min(hi.z) }
     }
 }
 
@@ -161,8 +157,7 @@ impl<S: Simd> Box8<S> {
             let slope = e.times(e);
             let slope = Vec8 { x: slope.x * thin[0], y: slope.y * thin[1], z: slope.z * thin[2] };
             let step = c.dot_row(thin) / slope.dot_row(thin);
-            let near =
-                Vec8 { x: c.x - slope.x * step, y: c.y - slope.y * step, z: c.z - slope.z * step };
+            let near = Vec8 { x: c.x - slope.x * step, y: c.y - slope.y * step, z: c.z - slope.z * step };
             bound = bound.max(positive(self.plane(lobe, near.clamp(lo, hi))));
         }
         bound

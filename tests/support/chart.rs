@@ -65,7 +65,8 @@ impl Chart<DVec2> for Triangle {
 }
 
 /// Normals of the hemisphere around +z by their slopes: with (p, q) the slopes over (alpha_x, alpha_y) and r their
-/// length, (r^2 / (1 + r^2), azimuth). GGX normals have even density in it.
+/// length, (1 - 1 / sqrt(1 + r^2), azimuth). For alpha = 1 that is 1 - cos, equal areas; narrow lobes spread over about
+/// as much of the chart, and their tails stay visible.
 #[derive(Debug, Clone, Copy)]
 pub struct Slopes {
     /// Unit of slopes along x.
@@ -76,12 +77,13 @@ pub struct Slopes {
 
 impl Chart<DVec3> for Slopes {
     fn point(&self, s: DVec2) -> Option<(DVec3, f64)> {
-        let r2 = s.x / (1.0 - s.x);
+        let c = 1.0 - s.x;
+        let r2 = s.x * (1.0 + c) / (c * c);
         let (sin, cos) = (TAU * s.y).sin_cos();
         let (x, y) = (self.alpha_x * r2.sqrt() * cos, self.alpha_y * r2.sqrt() * sin);
         let m = DVec3::new(x, y, 1.0) / (1.0 + x * x + y * y).sqrt();
-        // dm = cos^3 dx dy, dx dy = ax ay r dr d(azimuth), 2 r dr = ds / (1 - s)^2.
-        let area = m.z.powi(3) * self.alpha_x * self.alpha_y * PI / (1.0 - s.x).powi(2);
+        // dm = cos^3 dx dy, dx dy = ax ay r dr d(azimuth), r dr = ds / c^3.
+        let area = (m.z / c).powi(3) * self.alpha_x * self.alpha_y * TAU;
         (area > 0.0).then_some((m, area))
     }
 
@@ -91,7 +93,7 @@ impl Chart<DVec3> for Slopes {
         }
         let (x, y) = (m.x / m.z / self.alpha_x, m.y / m.z / self.alpha_y);
         let r2 = x * x + y * y;
-        Some(DVec2::new(if r2 > 1e100 { 1.0 } else { r2 / (1.0 + r2) }, turn(x, y)))
+        Some(DVec2::new(r2 / (1.0 + r2 + (1.0 + r2).sqrt()), turn(x, y)))
     }
 }
 

@@ -74,7 +74,8 @@ impl Estimate {
         }
         let variance = self.total_variance + other.total_variance;
         for c in 0..3 {
-            family.add(format!("{names}, mean of channel {c}"), p((self.total - other.total)[c], variance[c]));
+            family
+                .add(format!("{names}, mean of channel {c}"), p((self.total - other.total)[c], variance[c]));
         }
         let ratio = self.total / other.total;
         let noise = variance.map(f64::sqrt) / other.total;

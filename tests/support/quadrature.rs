@@ -29,8 +29,8 @@ const NODES: [f64; 4] =
 const WEIGHTS: [f64; 4] =
     [0.173_927_422_568_726_93, 0.326_072_577_431_273_07, 0.326_072_577_431_273_07, 0.173_927_422_568_726_93];
 
-/// Halvings a kink or a jump is followed for.
-const DEPTH: u32 = 12;
+/// Halvings a kink or a jump is followed for, when it is not lost in the tolerance before.
+const DEPTH: u32 = 6;
 
 /// Halvings that are always made. A jump that only cuts a corner off a part slips between the nodes; this far down,
 /// such corners are about 1e-4 of the rectangle.
@@ -58,8 +58,8 @@ fn half_weights() -> [[f64; 4]; 2] {
 }
 
 /// Integral of `f`, halving the rectangle until what is seen of each quarter is what its parent foretold, up to the
-/// absolute error `tolerance` altogether, for smooth functions. Jumps leave an error of about 1e-4 of their height times
-/// the rectangle's area.
+/// absolute error `tolerance` altogether, for smooth functions. Jumps leave an error of less than 1e-3 of their height
+/// times the rectangle's area.
 pub fn integrate(f: &impl Fn(DVec2) -> f64, r: Rectangle, tolerance: f64) -> f64 {
     refine(f, r, &evaluate(f, r), &half_weights(), tolerance, DEPTH)
 }
@@ -99,9 +99,9 @@ mod tests {
         assert!((smooth - (E - 1.0).powi(2)).abs() < 1e-9);
         let (center, radius) = (DVec2::new(0.45, 0.52), 0.37);
         let disc = integrate(&|p| f64::from(p.distance(center) < radius), Rectangle::UNIT, 1e-7);
-        assert!((disc - PI * radius * radius).abs() < 2e-4, "{}", disc - PI * radius * radius);
+        assert!((disc - PI * radius * radius).abs() < 5e-4, "{}", disc - PI * radius * radius);
         let root = integrate(&|p| p.x.sqrt() * p.y, Rectangle::UNIT, 1e-9);
-        assert!((root - 1.0 / 3.0).abs() < 1e-8, "{}", root - 1.0 / 3.0);
+        assert!((root - 1.0 / 3.0).abs() < 1e-6, "{}", root - 1.0 / 3.0);
     }
 
     #[test]

@@ -17,7 +17,25 @@ const STEPS: u64 = 1000;
 pub struct Reporter {
     log: Log,
     display: Display,
+    rate: Mutex<Rate>,
     stop: AtomicBool,
+}
+
+/// Accepted connections per second, as of the last time that their number grew: it does so in large steps.
+#[derive(Default)]
+struct Rate {
+    accepted: u64,
+    per_second: Option<f64>,
+}
+
+impl Rate {
+    fn update(&mut self, p: &Progress) -> Option<f64> {
+        if p.accepted > self.accepted && p.elapsed > 0.0 {
+            self.accepted = p.accepted;
+            self.per_second = Some(p.accepted as f64 / p.elapsed);
+        }
+        self.per_second
+    }
 }
 
 enum Display {
@@ -35,7 +53,7 @@ impl Reporter {
         } else {
             Display::Lines(Mutex::new(Instant::now()))
         };
-        Self { log, display, stop: AtomicBool::new(false) }
+        Self { log, display, rate: Mutex::default(), stop: AtomicBool::new(false) }
     }
 
     /// Asks the render to stop; false when that has been asked before.
@@ -61,19 +79,25 @@ impl Reporter {
 
 impl Observer for Reporter {
     fn progress(&self, progress: &Progress) {
+        // Whoever does not get the lock is told about by the one who has it.
+        let Ok(mut rate) = self.rate.try_lock() else { return };
+        let rate = rate.update(progress);
         match &self.display {
             Display::Nothing => {}
             Display::Bar(bar) => {
                 bar.set_position((progress.done() * STEPS as f64) as u64);
-                bar.set_message(describe(progress));
+                bar.set_message(describe(progress, rate));
             }
             Display::Lines(last) => {
-                // Whoever does not get the lock is told about by the one who has it.
                 if let Ok(mut last) = last.try_lock()
                     && last.elapsed() >= BETWEEN_LINES
                 {
                     *last = Instant::now();
-                    self.log.info(format_args!("{:3.0} %  {}", 100.0 * progress.done(), describe(progress)));
+                    self.log.info(format_args!(
+                        "{:3.0} %  {}",
+                        100.0 * progress.done(),
+                        describe(progress, rate)
+                    ));
                 }
             }
         }
@@ -98,7 +122,7 @@ fn bar() -> ProgressBar {
 }
 
 /// Iteration, time left and connections, on one line.
-fn describe(p: &Progress) -> String {
+fn describe(p: &Progress, rate: Option<f64>) -> String {
     let mut text = match p.iterations {
         Some(n) => format!("iteration {} of {n}", (p.iteration + 1).min(n)),
         None => format!("iteration {}", p.iteration + 1),
@@ -107,8 +131,8 @@ fn describe(p: &Progress) -> String {
     if let Some(remaining) = p.remaining() {
         text += &format!(", {} left", duration(remaining));
     }
-    if p.accepted > 0 && p.elapsed > 0.0 {
-        text += &format!(", {} connections/s", quantity(p.accepted as f64 / p.elapsed));
+    if let Some(rate) = rate {
+        text += &format!(", {} connections/s", quantity(rate));
     }
     text
 }
@@ -124,14 +148,26 @@ mod tests {
             iterations: Some(10),
             fraction: 0.5,
             elapsed: 5.0,
-            accepted: 6_170_000,
+            accepted: 0,
             time_limit: None,
         };
-        assert_eq!(describe(&p), "iteration 3 of 10, 5.0 s, 15.0 s left, 1.23 M connections/s");
-        let last = Progress { iteration: 10, fraction: 0.0, accepted: 0, ..p };
-        assert_eq!(describe(&last), "iteration 10 of 10, 5.0 s, 0.0 s left");
-        let timed = Progress { iterations: None, time_limit: Some(8.0), accepted: 0, ..p };
-        assert_eq!(describe(&timed), "iteration 3, 5.0 s, 3.0 s left");
+        assert_eq!(
+            describe(&p, Some(1.234e6)),
+            "iteration 3 of 10, 5.0 s, 15.0 s left, 1.23 M connections/s"
+        );
+        let last = Progress { iteration: 10, fraction: 0.0, ..p };
+        assert_eq!(describe(&last, None), "iteration 10 of 10, 5.0 s, 0.0 s left");
+        let timed = Progress { iterations: None, time_limit: Some(8.0), ..p };
+        assert_eq!(describe(&timed, None), "iteration 3, 5.0 s, 3.0 s left");
+    }
+
+    #[test]
+    fn the_rate_holds_between_steps() {
+        let mut rate = Rate::default();
+        let at = |elapsed, accepted| Progress { elapsed, accepted, ..Progress::default() };
+        let seen =
+            [(0.5, 0), (1.0, 0), (2.0, 600), (3.0, 600), (4.0, 2000)].map(|(t, n)| rate.update(&at(t, n)));
+        assert_eq!(seen, [None, None, Some(300.0), Some(300.0), Some(500.0)]);
     }
 
     #[test]
