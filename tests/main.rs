@@ -12,5 +12,7 @@ mod image;
 mod settings;
 mod cli;
 mod agreement;
+mod ray_offset;
+mod visibility;
 mod determinism;
 mod mis;

@@ -19,7 +19,8 @@ pub struct SurfacePoint {
     pub barycentric: DVec2,
     /// Triangle index.
     pub triangle: u32,
-    /// How far the position and a ray tracer's idea of the triangle may lie apart, world units.
+    /// What a unit in the last place of an `f32` is worth here, world units: of the coordinates relative to the mesh's
+    /// origin, or of the triangle's extent where that is larger. Rays start off the surface by a little more.
     pub error: f64,
 }
 
