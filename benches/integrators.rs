@@ -176,7 +176,11 @@ fn rays() {
             let hits = rays
                 .iter()
                 .filter(|(ray, shadow)| {
-                    if *shadow { world.visibility.occluded(ray) } else { world.visibility.intersect(ray).is_some() }
+                    if *shadow {
+                        world.visibility.occluded(ray)
+                    } else {
+                        world.visibility.intersect(ray).is_some()
+                    }
                 })
                 .count();
             let raw = start.elapsed().as_secs_f64();
