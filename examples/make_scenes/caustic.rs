@@ -7,9 +7,9 @@ use glam::{DAffine3, DQuat, DVec3, dvec3};
 use std::f64::consts::TAU;
 
 /// Centre of what makes the caustic, on the floor.
-const STAGE: DVec3 = dvec3(-0.02, 0.0, -0.82);
-/// Centre of the lamp, outside the picture to the left.
-const LAMP: DVec3 = dvec3(-1.45, 0.78, -1.05);
+const STAGE: DVec3 = dvec3(0.0, 0.0, -0.78);
+/// Centre of the lamp: to the left of the picture, and behind the plane of the mirror, which it must not shine on.
+const LAMP: DVec3 = dvec3(-1.12, 0.62, -1.39);
 /// Side of the square lamp.
 const LAMP_SIDE: f64 = 0.05;
 /// Segments of the metal strip.
@@ -28,9 +28,16 @@ Kd 0.20 0.11 0.06
 newmtl red
 Kd 0.65 0.09 0.06
 
+newmtl blue
+Kd 0.10 0.22 0.50
+
 newmtl lamp
 Kd 0 0 0
-Ke 1500 1350 1150
+Ke 1000 900 760
+
+newmtl sky
+Kd 0 0 0
+Ke 0.33 0.39 0.48
 ";
 
 /// The mirror and the strip in terms of MTL, for programs that know nothing of `scene.toml`.
@@ -68,9 +75,9 @@ illum 7
 const CAMERA: &str = "\
 [camera]
 origin = [0, 1.3, 2.6]
-target = [0, 0.42, -1.3]
+target = [0, 0.34, -1.3]
 up     = [0, 1, 0]
-fov_y  = 19.0
+fov_y  = 21.0
 
 [film]
 width  = 200
@@ -106,7 +113,7 @@ pub fn glass() -> Vec<File> {
     let comment = "A lamp, a glass ball, and a mirror that shows the caustic it throws on the floor";
     let mut obj = room(comment);
     obj.part("ball", "glass");
-    obj.ball(STAGE + dvec3(-0.12, 0.1502, 0.0), 0.15, 64, 128);
+    obj.ball(STAGE + dvec3(-0.12, 0.1602, -0.05), 0.16, 64, 128);
     let toml = format!(
         "# {comment}.\nobj = [\"scene.obj\"]\n\n{CAMERA}{}\n[material.glass]\ntype = \"dielectric\"\nior  = 1.5\n",
         mirror_toml("1e-4")
@@ -140,8 +147,14 @@ fn room(comment: &str) -> Obj {
     obj.quad([p(-3.0, 0.0, -1.8), p(3.0, 0.0, -1.8), p(3.0, 2.4, -1.8), p(-3.0, 2.4, -1.8)]);
     stand(&mut obj);
     obj.part("red_ball", "red");
-    obj.ball(dvec3(0.5, 0.1, -1.0), 0.1, 32, 64);
+    obj.ball(dvec3(-0.52, 0.1, -0.6), 0.1, 32, 64);
+    obj.part("blue_box", "blue");
+    let turned = DQuat::from_rotation_y(f64::to_radians(25.0));
+    obj.cuboid(DAffine3::from_rotation_translation(turned, dvec3(0.6, 0.08, -1.12)), DVec3::splat(0.08));
     lamp(&mut obj);
+    // A large dim panel overhead keeps shadows from being black.
+    obj.part("sky", "sky");
+    obj.quad([p(-1.2, 2.4, -0.5), p(1.2, 2.4, -0.5), p(1.2, 2.4, 1.1), p(-1.2, 2.4, 1.1)]);
     obj
 }
 
@@ -185,10 +198,10 @@ fn lamp(obj: &mut Obj) {
 /// A strip bent to an arc that opens towards the lamp.
 fn with_strip(comment: &str) -> Obj {
     let mut obj = room(comment);
-    let (radius, height, thickness): (f64, f64, f64) = (0.24, 0.12, 0.004);
+    let (radius, height, thickness): (f64, f64, f64) = (0.34, 0.13, 0.004);
     let away = STAGE - LAMP;
     let middle = away.x.atan2(away.z);
-    let span = 0.54 * TAU;
+    let span = 0.5 * TAU;
     let radial = |step: usize| {
         let phi = middle + span * (step as f64 / SEGMENTS as f64 - 0.5);
         dvec3(phi.sin(), 0.0, phi.cos())

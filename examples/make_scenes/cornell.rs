@@ -16,7 +16,7 @@ Kd 0.13 0.44 0.10
 
 newmtl lamp
 Kd 0 0 0
-Ke 22 16 9
+Ke 30 22 13
 
 # A metal of GGX roughness 0.1 that reflects Ks.
 newmtl metal
