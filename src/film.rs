@@ -1,1 +1,197 @@
-//! (being written)
+//! The film: exact sums, so that the order of additions does not matter.
+//!
+//! Values are added as 128-bit fixed-point numbers. Integer addition is associative: any thread count, any order of
+//! work and any split of a render into parts that are added up later give the same bits.
+
+use crate::error::{Error, Result};
+use crate::image::Image;
+use crate::math::Spectrum;
+use crate::scene::{FilmSettings, Filter};
+use glam::{DVec2, Vec3};
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicU64, Ordering};
+
+/// Units per 1.0: values are kept to 5e-20, sums up to 9e18.
+const ONE: f64 = (1u128 << 64) as f64;
+/// Standard deviation and cut-off radius of the Gaussian reconstruction filter, pixels.
+const GAUSSIAN: (f64, f64) = (0.5, 1.5);
+
+type Pixel = [i128; 3];
+
+/// A sum of samples for every pixel.
+#[derive(Debug)]
+pub struct Film {
+    width: u32,
+    height: u32,
+    filter: Filter,
+    rows: Vec<Mutex<Vec<Pixel>>>,
+    samples: u64,
+    dropped: AtomicU64,
+}
+
+impl Film {
+    /// A black film of no samples.
+    pub fn new(settings: &FilmSettings) -> Self {
+        let row = || Mutex::new(vec![[0; 3]; settings.width as usize]);
+        Self {
+            width: settings.width,
+            height: settings.height,
+            filter: settings.filter,
+            rows: (0..settings.height).map(|_| row()).collect(),
+            samples: 0,
+            dropped: AtomicU64::new(0),
+        }
+    }
+
+    /// Pixels across.
+    pub fn width(&self) -> u32 {
+        self.width
+    }
+
+    /// Pixels down.
+    pub fn height(&self) -> u32 {
+        self.height
+    }
+
+    /// Samples per pixel so far.
+    pub fn samples(&self) -> u64 {
+        self.samples
+    }
+
+    /// Values that were not finite and therefore left out. Always 0 unless hrr has a bug.
+    pub fn dropped(&self) -> u64 {
+        self.dropped.load(Ordering::Relaxed)
+    }
+
+    /// Says that every pixel has had `n` more samples.
+    pub fn count_samples(&mut self, n: u64) {
+        self.samples += n;
+    }
+
+    /// Adds a value at a raster position in [0,width) x [0,height), through the reconstruction filter. From any thread.
+    pub fn add(&self, raster: DVec2, value: Spectrum) {
+        if value == Spectrum::ZERO {
+            return;
+        }
+        if !value.is_finite() {
+            self.dropped.fetch_add(1, Ordering::Relaxed);
+            return;
+        }
+        match self.filter {
+            Filter::Box => self.add_pixel(raster.x as u32, raster.y as u32, value),
+            Filter::Gaussian => self.add_gaussian(raster, value),
+        }
+    }
+
+    /// Spreads the value over the pixels around it; at the border the filter is cut and scaled up again.
+    fn add_gaussian(&self, raster: DVec2, value: Spectrum) {
+        let (sigma, radius) = GAUSSIAN;
+        let axis = |at: f64, size: u32| {
+            let first = (at - 0.5 - radius).ceil().max(0.0) as u32;
+            let last = ((at - 0.5 + radius).floor() as u32).min(size - 1);
+            let weight = move |i: u32| {
+                let d = (f64::from(i) + 0.5 - at) / sigma;
+                (-0.5 * d * d).exp()
+            };
+            let sum: f64 = (first..=last).map(weight).sum();
+            (first..=last).map(move |i| (i, weight(i) / sum))
+        };
+        for (y, wy) in axis(raster.y, self.height) {
+            for (x, wx) in axis(raster.x, self.width) {
+                self.add_pixel(x, y, value * (wx * wy));
+            }
+        }
+    }
+
+    fn add_pixel(&self, x: u32, y: u32, value: Spectrum) {
+        let (x, y) = (x.min(self.width - 1), y.min(self.height - 1));
+        let fixed = value.to_array().map(|v| (v * ONE) as i128);
+        let mut row = self.rows[y as usize].lock().unwrap_or_else(|poisoned| poisoned.into_inner());
+        for (sum, v) in row[x as usize].iter_mut().zip(fixed) {
+            *sum = sum.saturating_add(v);
+        }
+    }
+
+    /// Adds another film of the same size, as if its samples had been taken here.
+    pub fn merge(&mut self, other: &Film) -> Result<()> {
+        if (self.width, self.height) != (other.width, other.height) {
+            return Err(Error::Input(format!(
+                "cannot add a film of {}x{} to one of {}x{}",
+                other.width, other.height, self.width, self.height
+            )));
+        }
+        for (row, other) in self.rows.iter_mut().zip(&other.rows) {
+            let row = row.get_mut().unwrap_or_else(|poisoned| poisoned.into_inner());
+            let other = other.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
+            for (sum, v) in row.iter_mut().flatten().zip(other.iter().flatten()) {
+                *sum = sum.saturating_add(*v);
+            }
+        }
+        self.samples += other.samples;
+        *self.dropped.get_mut() += other.dropped();
+        Ok(())
+    }
+
+    /// The mean of a pixel, in double precision.
+    pub fn mean(&self, x: u32, y: u32) -> Spectrum {
+        let row = self.rows[y as usize].lock().unwrap_or_else(|poisoned| poisoned.into_inner());
+        Spectrum::from_array(row[x as usize].map(|v| v as f64 / (ONE * self.samples.max(1) as f64)))
+    }
+
+    /// The image so far: sums divided by the number of samples; black when there are none.
+    pub fn image(&self) -> Image {
+        let pixels: Vec<Vec3> =
+            (0..self.height).flat_map(|y| (0..self.width).map(move |x| self.mean(x, y).as_vec3())).collect();
+        Image { width: self.width, height: self.height, pixels }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn film(filter: Filter) -> Film {
+        Film::new(&FilmSettings { width: 8, height: 6, filter })
+    }
+
+    #[test]
+    fn any_order_and_any_split_give_the_same_bits() {
+        let value = |i: u64| Spectrum::new(0.1 * i as f64, 1e9 / (i + 1) as f64, 1e-9 * i as f64);
+        let at = |i: u64| DVec2::new((i * 7 % 80) as f64 / 10.0, (i * 13 % 60) as f64 / 10.0);
+        for filter in [Filter::Box, Filter::Gaussian] {
+            let (forward, backward) = (film(filter), film(filter));
+            let (mut first, mut second) = (film(filter), film(filter));
+            for i in 0..1000 {
+                forward.add(at(i), value(i));
+                backward.add(at(999 - i), value(999 - i));
+                if i < 300 { &first } else { &second }.add(at(i), value(i));
+            }
+            first.count_samples(0);
+            second.count_samples(0);
+            first.merge(&second).unwrap();
+            for other in [&backward, &first] {
+                for (x, y) in (0..8).flat_map(|x| (0..6).map(move |y| (x, y))) {
+                    assert_eq!(forward.mean(x, y), other.mean(x, y));
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn the_gaussian_keeps_energy_up_to_the_border() {
+        for raster in [DVec2::new(3.3, 2.8), DVec2::new(0.0, 0.0), DVec2::new(7.99, 5.99)] {
+            let film = film(Filter::Gaussian);
+            film.add(raster, Spectrum::splat(2.0));
+            let sum: f64 = film.image().pixels.iter().map(|p| f64::from(p.x)).sum();
+            assert!((sum - 2.0).abs() < 1e-6, "{raster}: {sum}");
+        }
+    }
+
+    #[test]
+    fn what_is_not_finite_is_left_out_and_counted() {
+        let film = film(Filter::Box);
+        film.add(DVec2::ONE, Spectrum::new(f64::NAN, 1.0, 1.0));
+        film.add(DVec2::ONE, Spectrum::new(1.0, f64::INFINITY, 1.0));
+        assert_eq!((film.dropped(), film.mean(1, 1)), (2, Spectrum::ZERO));
+    }
+}

@@ -4,6 +4,7 @@
 //! The modules stand in reading order, each using only what stands above it (`docs/architecture.md`).
 
 pub mod error;
+pub mod file;
 pub mod math;
 pub mod sampler;
 pub mod settings;
@@ -23,8 +24,9 @@ pub mod visibility;
 
 pub mod vertex_bvh;
 pub mod roulette;
-pub mod subpath;
+pub mod tally;
 pub mod mis;
+pub mod subpath;
 pub mod light_cache;
 pub mod connect;
 

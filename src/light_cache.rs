@@ -1,1 +1,117 @@
-//! (being written)
+//! The light-vertex cache: every vertex of an iteration's light subpaths, stored compactly.
+
+use crate::geometry::SurfacePoint;
+use crate::math::Spectrum;
+use crate::mis::Side;
+use crate::subpath::{Vertex, Walk, World};
+use glam::Vec3;
+use std::ops::Range;
+
+/// What is kept of a light vertex beside its position. The scattering model is made again from the triangle.
+#[derive(Debug, Clone, Copy)]
+struct Record {
+    triangle: u32,
+    barycentric: [f32; 2],
+    wo: Vec3,
+    distance: f32,
+    throughput: Vec3,
+    depth: u32,
+    after_delta: bool,
+    side: Side,
+}
+
+/// Light vertices in the order of their subpaths. Buffers are kept between iterations.
+#[derive(Debug, Default)]
+pub struct LightCache {
+    positions: Vec<Vec3>,
+    records: Vec<Record>,
+    /// First vertex of each subpath, and the end.
+    starts: Vec<u32>,
+}
+
+impl LightCache {
+    /// Forgets all vertices, keeping the memory.
+    pub fn clear(&mut self) {
+        self.positions.clear();
+        self.records.clear();
+        self.starts.clear();
+        self.starts.push(0);
+    }
+
+    /// Stores a vertex of the subpath that is being traced.
+    pub fn push(&mut self, light: &Walk) {
+        let point = &light.vertex.point;
+        self.positions.push(point.position.as_vec3());
+        self.records.push(Record {
+            triangle: point.triangle,
+            barycentric: point.barycentric.as_vec2().to_array(),
+            wo: light.vertex.wo.as_vec3(),
+            distance: light.distance as f32,
+            throughput: light.throughput.as_vec3(),
+            depth: light.depth,
+            after_delta: light.after_delta,
+            side: light.side,
+        });
+    }
+
+    /// Ends the subpath that is being traced.
+    pub fn end_subpath(&mut self) {
+        self.starts.push(self.positions.len() as u32);
+    }
+
+    /// Appends another cache's subpaths.
+    pub fn append(&mut self, other: &Self) {
+        let offset = self.positions.len() as u32;
+        self.positions.extend_from_slice(&other.positions);
+        self.records.extend_from_slice(&other.records);
+        self.starts.extend(other.starts[1..].iter().map(|s| s + offset));
+    }
+
+    /// Number of vertices.
+    pub fn len(&self) -> usize {
+        self.positions.len()
+    }
+
+    /// True when there is no vertex.
+    pub fn is_empty(&self) -> bool {
+        self.positions.is_empty()
+    }
+
+    /// Positions relative to the mesh's origin, in the precision that the roulette judges them by.
+    pub fn positions(&self) -> &[Vec3] {
+        &self.positions
+    }
+
+    /// The vertices of a subpath.
+    pub fn subpath(&self, index: usize) -> Range<usize> {
+        self.starts[index] as usize..self.starts[index + 1] as usize
+    }
+
+    /// Segments between a vertex and its light.
+    pub fn depth(&self, index: usize) -> u32 {
+        self.records[index].depth
+    }
+
+    /// A vertex, ready to be connected to. Its position is the stored one, to the bit.
+    pub fn load(&self, world: &World<'_>, index: usize) -> Walk {
+        let r = &self.records[index];
+        let [u, v] = r.barycentric.map(f64::from);
+        let mut point = SurfacePoint::at_barycentric(&world.scene.mesh, r.triangle, u, v);
+        point.position = self.positions[index].as_dvec3();
+        Walk {
+            vertex: Vertex::new(world, point, r.wo.as_dvec3().normalize()),
+            throughput: Spectrum::from(r.throughput),
+            side: r.side,
+            distance: f64::from(r.distance),
+            depth: r.depth,
+            after_delta: r.after_delta,
+        }
+    }
+
+    /// Bytes of all buffers.
+    pub fn bytes(&self) -> usize {
+        self.positions.capacity() * size_of::<Vec3>()
+            + self.records.capacity() * size_of::<Record>()
+            + self.starts.capacity() * size_of::<u32>()
+    }
+}

@@ -1,1 +1,42 @@
-//! (being written)
+//! The recursion of multiple importance sampling: the only file that knows it.
+//!
+//! A path x_0 (on a light) .. x_{k-1} (the camera) is found by technique s when its first s vertices come from the
+//! light. With fw_i and rv_i the area densities of x_i in the direction of light and of eye, technique s has density
+//! m_s prod_{i<s} fw_i prod_{i>=s} rv_i, where m_s says how often it tries (docs/theory.md section 6). The balance
+//! heuristic's weight of s is m_s / (L_s + m_s + E_s), with the densities of all techniques with fewer (L) and more
+//! (E) light vertices relative to that of s. Both sums are carried along the two subpaths by one recursion
+//! [VCM-TR, eq. 34-40; there dVCM and dVC].
+
+/// What one subpath knows, at its last vertex x, of the techniques that would have made it from the other end.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Side {
+    /// 1 / (area density of x along this subpath).
+    #[doc(alias = "dVCM")]
+    pub a: f64,
+    /// `a` times the sum up to the predecessor, less the density of scattering back to it, which needs the successor.
+    #[doc(alias = "dVC")]
+    pub b: f64,
+}
+
+impl Side {
+    /// Arrival at a vertex. `pdf_w`: density of the direction taken at the predecessor, 1/sr; `cos`: |cos| at the
+    /// new vertex and at the predecessor, between its geometric normal and the edge; `total`: [`Side::total`] there.
+    pub fn arrive(pdf_w: f64, cos: f64, cos_previous: f64, distance2: f64, total: f64) -> Self {
+        let per_area = pdf_w * cos;
+        Self { a: distance2 / per_area, b: cos_previous * total / per_area }
+    }
+
+    /// The sum of the techniques that split this subpath before or at its last edge, over the area density with which
+    /// the other subpath would choose the vertex: L_s = rv_{s-1} total, E_s = fw_s total.
+    ///
+    /// `m`: how often the technique that connects the last edge tries; `pdf_w_back`: density of scattering back along
+    /// that edge when coming from the successor, 1/sr.
+    pub fn total(&self, m: f64, pdf_w_back: f64) -> f64 {
+        self.a * m + pdf_w_back * self.b
+    }
+}
+
+/// The area density of a vertex, given the density of a direction towards it: 1/(world unit)^2.
+pub fn per_area(pdf_w: f64, cos: f64, distance2: f64) -> f64 {
+    pdf_w * cos / distance2
+}

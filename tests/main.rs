@@ -1,4 +1,18 @@
 //! All integration tests, one binary.
 
+mod loading;
 mod hard_cases;
 mod roulette;
+mod support;
+
+mod bsdf;
+mod light;
+mod warps;
+mod image;
+mod settings;
+mod cli;
+mod agreement;
+mod ray_offset;
+mod visibility;
+mod determinism;
+mod mis;

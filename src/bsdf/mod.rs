@@ -5,8 +5,17 @@ use crate::math::Spectrum;
 use glam::{DVec2, DVec3};
 
 pub mod lambert;
+pub mod fresnel;
+pub mod ggx;
+pub mod mirror;
+pub mod conductor;
+pub mod dielectric;
 
+pub use conductor::Conductor;
+pub use dielectric::Dielectric;
+pub use fresnel::Reflectance;
 pub use lambert::Lambert;
+pub use mirror::Mirror;
 
 /// What a subpath carries, which decides how refraction scales it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -33,11 +42,28 @@ pub struct BsdfSample {
     pub delta: bool,
 }
 
+/// The glossy reflection of a [`Bsdf`], for those who want to know where its light goes without drawing directions.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Glossy {
+    /// GGX roughness along x, not squared.
+    pub alpha_x: f64,
+    /// GGX roughness along y, not squared.
+    pub alpha_y: f64,
+    /// Index inside (-z) over outside where light is refracted as well; `None` for reflectors.
+    pub eta: Option<f64>,
+}
+
 /// A scattering model with its parameters at a point.
 #[derive(Debug, Clone, Copy)]
 pub enum Bsdf {
     /// Diffuse reflection.
     Lambert(Lambert),
+    /// Metal, rough or smooth.
+    Conductor(Conductor),
+    /// Reflection and refraction, rough or smooth.
+    Dielectric(Dielectric),
+    /// Perfect reflection.
+    Mirror(Mirror),
 }
 
 impl Bsdf {
@@ -46,6 +72,9 @@ impl Bsdf {
     pub fn eval(&self, w_eye: DVec3, w_light: DVec3) -> Spectrum {
         match self {
             Self::Lambert(b) => b.eval(w_eye, w_light),
+            Self::Conductor(b) => b.eval(w_eye, w_light),
+            Self::Dielectric(b) => b.eval(w_eye, w_light),
+            Self::Mirror(_) => Spectrum::ZERO,
         }
     }
 
@@ -53,27 +82,49 @@ impl Bsdf {
     pub fn pdf(&self, wo: DVec3, wi: DVec3) -> f64 {
         match self {
             Self::Lambert(b) => b.pdf(wo, wi),
+            Self::Conductor(b) => b.pdf(wo, wi),
+            Self::Dielectric(b) => b.pdf(wo, wi),
+            Self::Mirror(_) => 0.0,
         }
     }
 
     /// Draws a direction; `lobe` and `u` are uniform in [0,1). `None` when the draw fell where nothing scatters.
     pub fn sample(&self, wo: DVec3, transport: Transport, lobe: f64, u: DVec2) -> Option<BsdfSample> {
-        let _ = (transport, lobe);
         match self {
             Self::Lambert(b) => b.sample(wo, u),
+            Self::Conductor(b) => b.sample(wo, u),
+            Self::Dielectric(b) => b.sample(wo, transport, lobe, u),
+            Self::Mirror(b) => b.sample(wo),
         }
     }
 
     /// True when there are only delta lobes, so that connecting to this vertex is pointless.
     pub fn is_delta(&self) -> bool {
-        false
+        match self {
+            Self::Lambert(_) => false,
+            Self::Conductor(b) => b.is_delta(),
+            Self::Dielectric(b) => b.is_delta(),
+            Self::Mirror(_) => true,
+        }
     }
 
-    /// An upper bound of what is scattered on, 0..=1: the survival probability of Russian roulette. A property of the
-    /// point alone, so that both directions of a path agree on it.
+    /// About how much is scattered on, 0..=1: the survival probability of Russian roulette. A property of the point
+    /// alone, so that both directions of a path agree on it; 0 only where nothing is ever scattered.
     pub fn survival(&self) -> f64 {
         match self {
             Self::Lambert(b) => b.survival(),
+            Self::Conductor(b) => b.survival(),
+            Self::Dielectric(_) => 1.0,
+            Self::Mirror(b) => b.survival(),
+        }
+    }
+
+    /// The glossy reflection, if the model has one that is not a delta lobe.
+    pub fn glossy(&self) -> Option<Glossy> {
+        match self {
+            Self::Lambert(_) | Self::Mirror(_) => None,
+            Self::Conductor(b) => b.glossy(),
+            Self::Dielectric(b) => b.glossy(),
         }
     }
 }

@@ -1,1 +1,5 @@
-//! (being written)
+//! Emitters: picking one, points and directions on it, and the densities of both.
+
+pub mod area;
+
+pub use area::{EmitterPoint, Lights};

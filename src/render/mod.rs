@@ -1,1 +1,153 @@
-//! (being written)
+//! A whole render: iterations until their number, the time or the observer says enough.
+
+pub mod counters;
+pub mod observer;
+
+pub use counters::{Counters, Memory, Seconds, Stats};
+pub use observer::{Observer, Progress, Silent};
+
+use crate::error::{Error, Result};
+use crate::film::Film;
+use crate::integrator;
+use crate::scene::Scene;
+use crate::settings::{Integrator, Settings};
+use crate::subpath::World;
+use crate::tally::Tally;
+use std::collections::BTreeMap;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::time::Instant;
+
+/// What a render leaves.
+#[derive(Debug)]
+pub struct Outcome {
+    /// The samples; [`Film::image`] makes the image.
+    pub film: Film,
+    /// What was done and what it cost. `seconds.load` and `seconds.total` are for the caller to fill in.
+    pub stats: Stats,
+    /// Whether the observer ended it.
+    pub interrupted: bool,
+}
+
+/// Renders a scene. The film depends on the scene, the settings' seed and the range of iterations only: not on
+/// threads, and films of consecutive ranges add up to that of the whole range, bit for bit.
+///
+/// # Errors
+/// An unusable scene or setting, and what the libraries below report.
+pub fn render(scene: &Scene, settings: &Settings, observer: &dyn Observer) -> Result<Outcome> {
+    let threads = rayon::ThreadPoolBuilder::new()
+        .num_threads(settings.threads)
+        .build()
+        .map_err(|e| Error::Internal(format!("cannot start {} threads: {e}", settings.threads)))?;
+    threads.install(|| run(scene, settings, observer))
+}
+
+fn run(scene: &Scene, settings: &Settings, observer: &dyn Observer) -> Result<Outcome> {
+    let mut settings = settings.clone();
+    settings.integrator = chosen(scene, &settings);
+    let start = Instant::now();
+    let world = World::new(scene, &settings)?;
+    let accel_build = start.elapsed().as_secs_f64();
+    if world.lights.is_empty() {
+        observer.warn("nothing in the scene emits light: the image is black");
+    }
+    let mut integrator = integrator::new(&world, &settings);
+    let mut film = Film::new(&scene.film);
+    let mut tally = Tally::default();
+    let mut bytes = (0, 0);
+
+    let start = Instant::now();
+    let iterations = settings.time.is_none().then_some(settings.iterations);
+    let accepted = AtomicU64::new(0);
+    let mut finished = 0;
+    let mut interrupted = false;
+    loop {
+        let elapsed = start.elapsed().as_secs_f64();
+        if iterations.is_some_and(|n| finished >= n) || settings.time.is_some_and(|t| elapsed >= t) {
+            break;
+        }
+        if observer.should_stop() {
+            interrupted = true;
+            break;
+        }
+        let progress = |fraction: f64| {
+            observer.progress(&Progress {
+                iteration: finished,
+                iterations,
+                fraction,
+                elapsed: start.elapsed().as_secs_f64(),
+                time_limit: settings.time,
+                accepted: accepted.load(Ordering::Relaxed),
+            });
+        };
+        progress(0.0);
+        tally.add(&integrator.iterate(settings.first_iteration + finished, &mut film, &progress)?);
+        finished += 1;
+        accepted.store(tally.roulette.accepted, Ordering::Relaxed);
+        let (cache, tree) = integrator.bytes();
+        bytes = (bytes.0.max(cache), bytes.1.max(tree));
+    }
+    let render = start.elapsed().as_secs_f64();
+    if film.dropped() > 0 {
+        observer.warn(&format!(
+            "{} samples were not finite and were left out: please report this",
+            film.dropped()
+        ));
+    }
+    let stats = Stats {
+        version: env!("CARGO_PKG_VERSION").into(),
+        scene: scene.path.display().to_string(),
+        integrator: settings.integrator.name().into(),
+        visibility: settings.visibility.name().into(),
+        threads: rayon::current_num_threads(),
+        seed: settings.seed,
+        width: film.width(),
+        height: film.height(),
+        iterations: finished,
+        effects: BTreeMap::new(),
+        seconds: Seconds {
+            load: 0.0,
+            accel_build,
+            light_trace: tally.light_trace,
+            vertex_bvh_build: tally.vertex_bvh_build,
+            eye_trace: tally.eye_trace,
+            roulette: tally.roulette_seconds,
+            visibility: tally.visibility,
+            film: tally.film,
+            render,
+            total: 0.0,
+        },
+        counters: Counters {
+            camera_rays: tally.camera_rays,
+            light_subpaths: tally.light_subpaths,
+            light_vertices: tally.light_vertices,
+            queries: tally.roulette.queries,
+            nodes_visited: tally.roulette.nodes,
+            accepted: tally.roulette.accepted,
+            connection_rays: tally.connection_rays,
+            visible_connections: tally.visible_connections,
+        },
+        memory: Memory {
+            peak_rss_bytes: counters::peak_rss_bytes(),
+            light_cache_bytes: bytes.0 as u64,
+            vertex_bvh_bytes: bytes.1 as u64,
+        },
+    };
+    Ok(Outcome { film, stats, interrupted })
+}
+
+/// What `auto` stands for: the least machinery that finds all of the scene's light.
+fn chosen(scene: &Scene, settings: &Settings) -> Integrator {
+    use crate::bsdf::Bsdf;
+    if settings.integrator != Integrator::Auto {
+        return settings.integrator;
+    }
+    let bsdfs: Vec<Bsdf> = scene.materials.iter().map(|m| m.bsdf(glam::DVec2::ZERO)).collect();
+    let glossy = |b: &Bsdf| b.glossy().is_some_and(|g| g.alpha_x.max(g.alpha_y) <= settings.hrr_alpha);
+    if bsdfs.iter().any(glossy) {
+        Integrator::LvcHrr
+    } else if bsdfs.iter().any(|b| b.is_delta() || b.glossy().is_some()) {
+        Integrator::Lvc
+    } else {
+        Integrator::Pt
+    }
+}

@@ -1,10 +1,32 @@
 //! A scene, from its files or from memory.
+//!
+//! A file is either a TOML scene, which names OBJ files, or a bare OBJ file. Whatever is wrong with one is an error
+//! with its file and line; whatever has to be bent to make sense is a warning with the same.
 
+use crate::error::{Error, Place, Result};
 use crate::geometry::Mesh;
 use crate::material::Material;
 use crate::settings::Settings;
+use document::{At, Table};
 use glam::DVec3;
-use std::path::PathBuf;
+use inputs::Inputs;
+use notes::Notes;
+use obj::Gathering;
+use settings_file::SettingsFile;
+use std::path::{Path, PathBuf};
+
+mod camera_keys;
+mod document;
+mod inputs;
+mod material_keys;
+mod mtl;
+mod mtl_rules;
+mod notes;
+mod obj;
+mod obj_scan;
+mod polygon;
+mod settings_file;
+mod textures;
 
 /// A perspective camera as a scene file gives it; world coordinates.
 #[derive(Debug, Clone, PartialEq)]
@@ -30,7 +52,37 @@ pub struct FilmSettings {
     pub width: u32,
     /// Pixels down.
     pub height: u32,
-    // filter: box | gaussian
+    /// Reconstruction filter.
+    pub filter: Filter,
+}
+
+/// How a sample spreads over pixels.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Filter {
+    /// The pixel it falls in.
+    #[default]
+    Box,
+    /// A Gaussian of half a pixel's standard deviation, cut at 1.5 pixels.
+    Gaussian,
+}
+
+impl Default for CameraSettings {
+    fn default() -> Self {
+        Self {
+            origin: DVec3::new(0.0, 0.0, 1.0),
+            target: DVec3::ZERO,
+            up: DVec3::Y,
+            fov_y: 40.0,
+            aperture_radius: 0.0,
+            focus_distance: 1.0,
+        }
+    }
+}
+
+impl Default for FilmSettings {
+    fn default() -> Self {
+        Self { width: 640, height: 480, filter: Filter::Box }
+    }
 }
 
 /// Everything that is rendered.
@@ -50,4 +102,82 @@ pub struct Scene {
     pub settings: Settings,
     /// What the loader wants the user to know, one sentence each.
     pub warnings: Vec<String>,
+    /// Fingerprint of the contents of all files and of the overrides (XXH3-64), the same on every machine; 0 when made
+    /// in memory.
+    pub hash: u64,
+}
+
+impl Scene {
+    /// Reads a scene from a `.toml` or `.obj` file.
+    ///
+    /// `overrides` are dotted keys of the TOML file and their values, such as `("camera.fov_y", "30")` or
+    /// `("material.mirror.alpha", "[1e-3, 1e-3]")`; they win over the file. A bare OBJ file gets a camera that sees all
+    /// of it, and its light from the materials' `Ke`.
+    ///
+    /// Errors: [`Error::Scene`] with file and line for what cannot be read, [`Error::Usage`] for overrides,
+    /// [`Error::Unsupported`] for what is understood but missing from hrr. Remarks go to [`Scene::warnings`].
+    pub fn load(path: &Path, overrides: &[(String, String)]) -> Result<Self> {
+        let mut inputs = Inputs::new();
+        let extension = path.extension().and_then(|e| e.to_str()).unwrap_or_default().to_ascii_lowercase();
+        let (mut document, bare) = match extension.as_str() {
+            "toml" => {
+                let bytes = inputs.read(path).map_err(|e| unreadable(path, &e))?;
+                let text = String::from_utf8(bytes)
+                    .map_err(|_| Error::scene(Place::file(path), "is not text (UTF-8)"))?;
+                (Table::parse(path, &text)?, false)
+            }
+            "obj" => (Table::default(), true),
+            _ => return Err(Error::scene(Place::file(path), "is neither a .toml scene nor an .obj file")),
+        };
+        for (key, value) in overrides {
+            inputs.add(key.as_bytes());
+            inputs.add(value.as_bytes());
+            document.merge(Table::parse_flag(key, value)?);
+        }
+        let file = SettingsFile::read(&document)?;
+        let mut notes = Notes::default();
+        let mut gathering = Gathering::default();
+        if bare {
+            gathering.add(path, &mut inputs, &mut notes)?;
+        }
+        let folder = path.parent().unwrap_or(Path::new(""));
+        for (name, at) in &file.objs {
+            let obj = folder.join(name);
+            if !obj.is_file() {
+                return Err(at.error(format!("there is no file '{}'", obj.display())));
+            }
+            gathering.add(&obj, &mut inputs, &mut notes)?;
+        }
+        let (mesh, mut materials) = gathering.finish(&mut notes);
+        if mesh.triangles.is_empty() {
+            return Err(Error::scene(Place::file(path), "the scene has no triangles"));
+        }
+        for keys in &file.materials {
+            keys.apply(&mut materials)?;
+        }
+        if !mesh.materials.iter().any(|&m| materials[m as usize].emits()) {
+            if bare {
+                let message =
+                    "a uniform environment in place of lights; give a material of the MTL file a Ke";
+                return Err(At::Line(Place::file(path)).unsupported(message));
+            }
+            notes.add("dark", &Place::file(path), "nothing emits light: the image will be black");
+        }
+        let aspect = f64::from(file.film.width) / f64::from(file.film.height);
+        let camera = file.camera.settings(&mesh, aspect)?;
+        Ok(Self {
+            path: path.to_owned(),
+            mesh,
+            materials,
+            camera,
+            film: file.film,
+            settings: file.settings,
+            warnings: notes.into_warnings(),
+            hash: inputs.hash(),
+        })
+    }
+}
+
+fn unreadable(path: &Path, e: &std::io::Error) -> Error {
+    Error::scene(Place::file(path), format!("cannot be read: {e}"))
 }

@@ -1,1 +1,10 @@
-//! (being written)
+//! Subpaths: random walks from the light and from the eye.
+
+pub mod world;
+pub mod vertex;
+pub mod walk;
+pub mod from_light;
+
+pub use vertex::{Scattered, Vertex};
+pub use walk::Walk;
+pub use world::World;

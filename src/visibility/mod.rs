@@ -1,10 +1,20 @@
 //! Which triangle a ray meets first, and whether anything stands between two points.
 
-use crate::geometry::SurfacePoint;
+use crate::error::Result;
+use crate::geometry::Mesh;
+use crate::settings::Backend;
 use glam::Vec3;
 
+pub mod brute;
+mod bvh4;
+#[cfg(feature = "embree")]
+pub mod embree;
+pub mod obvhs;
+pub mod offset;
+mod triangle;
+
 /// A ray in the mesh's coordinates. `direction` need not be normalised; hits lie in `t_min < t < t_max`.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Ray {
     /// Start.
     pub origin: Vec3,
@@ -29,8 +39,8 @@ pub struct Hit {
     pub t: f32,
 }
 
-/// A structure over one mesh that answers ray queries. Both faces of a triangle are seen. Any number of threads may
-/// ask at once.
+/// A structure over one mesh that answers ray queries. Both faces of a triangle are seen; degenerate triangles never
+/// are. Any number of threads may ask at once.
 pub trait Visibility: Send + Sync {
     /// The nearest hit, or `None`.
     fn intersect(&self, ray: &Ray) -> Option<Hit>;
@@ -38,10 +48,20 @@ pub trait Visibility: Send + Sync {
     fn occluded(&self, ray: &Ray) -> bool;
 }
 
-// To come from the author of this module:
-//   pub fn build(backend: settings::Backend, mesh: &Mesh, threads: usize) -> Result<Box<dyn Visibility>>
-//   offset.rs: pub fn leave(point: &SurfacePoint, direction: DVec3) -> Ray      (t_max = inf)
-//              pub fn between(a: &SurfacePoint, b: &SurfacePoint) -> Ray        (shadow ray)
-//              pub fn from_free_point(p: DVec3, ...) for the camera
-#[allow(unused)]
-type Reserved = SurfacePoint;
+/// Builds a backend's structure over a mesh with up to `threads` threads (0: all). The mesh is copied.
+///
+/// # Errors
+/// [`Error::Usage`] when the backend is not part of this build, [`Error::Input`] for an invalid mesh, and what the
+/// library below reports.
+pub fn build(backend: Backend, mesh: &Mesh, threads: usize) -> Result<Box<dyn Visibility>> {
+    match backend {
+        #[cfg(feature = "embree")]
+        Backend::Embree => Ok(Box::new(embree::Embree::new(mesh, threads)?)),
+        #[cfg(not(feature = "embree"))]
+        Backend::Embree => {
+            Err(crate::Error::Usage("this hrr was built without Embree (cargo feature 'embree')".into()))
+        }
+        Backend::Obvhs => Ok(Box::new(obvhs::Obvhs::new(mesh, threads)?)),
+        Backend::Brute => Ok(Box::new(brute::Brute::new(mesh)?)),
+    }
+}

@@ -1,1 +1,63 @@
-fn main() {}
+//! The program `hrr`: renders scenes from the command line. Data goes to stdout, everything else to stderr.
+
+mod args;
+mod log;
+mod progress;
+mod render;
+
+use args::Command;
+use log::Log;
+use std::backtrace::{Backtrace, BacktraceStatus};
+use std::io::Write;
+use std::panic::{self, PanicHookInfo, UnwindSafe};
+use std::process::ExitCode;
+
+/// A fault of the program itself, as in BSD's `sysexits.h`.
+const INTERNAL: u8 = 70;
+
+fn main() -> ExitCode {
+    panic::set_hook(Box::new(report_panic));
+    ExitCode::from(guard(run))
+}
+
+/// Does what the command line says; returns the exit code.
+fn run() -> u8 {
+    let command = match args::parse(std::env::args_os()) {
+        Ok(command) => command,
+        Err(e) => return args::explain(&e),
+    };
+    let Command::Render(args) = command;
+    let log = Log::new(args.verbosity);
+    render::run(&args, &log).unwrap_or_else(|error| {
+        log.error(&error);
+        error.exit_code()
+    })
+}
+
+/// A panic ends the program in an orderly way, with its own exit code.
+fn guard(work: impl FnOnce() -> u8 + UnwindSafe) -> u8 {
+    panic::catch_unwind(work).unwrap_or(INTERNAL)
+}
+
+fn report_panic(info: &PanicHookInfo<'_>) {
+    let what = info.payload_as_str().unwrap_or("unknown");
+    let place = info.location().map(|l| format!(" ({}:{})", l.file(), l.line())).unwrap_or_default();
+    let mut err = std::io::stderr().lock();
+    // Nobody is left to tell when stderr is closed.
+    let _ = writeln!(err, "hrr: internal error: {what}{place}\n     {}", log::BUG);
+    let trace = Backtrace::capture();
+    if trace.status() == BacktraceStatus::Captured {
+        let _ = writeln!(err, "{trace}");
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_panic_is_exit_code_70() {
+        assert_eq!(guard(|| 3), 3);
+        assert_eq!(guard(|| panic!("on purpose")), 70);
+    }
+}

@@ -1,0 +1,275 @@
+//! The bidirectional machine: light pass, vertex BVH, eye pass. What it does in each is a [`Recipe`].
+
+use super::Integrator;
+use super::recipe::{Base, Recipe};
+use super::tile::{self, Sample};
+use crate::connect::{self, EyeVertex, Roulette, Techniques};
+use crate::error::Result;
+use crate::film::Film;
+use crate::light_cache::LightCache;
+use crate::math::Spectrum;
+use crate::roulette::{self, Query};
+use crate::sampler::{Purpose, Sampler, Stream};
+use crate::settings::Settings;
+use crate::subpath::{World, from_light};
+use crate::tally::{Clock, Tally};
+use crate::vertex_bvh::VertexBvh;
+use rayon::prelude::*;
+use std::time::Instant;
+
+/// Light subpaths traced by one task.
+const CHUNK: u64 = 1024;
+/// Light subpaths of the pre-pass that estimates how many vertices one leaves.
+const PILOT: u64 = 16 * CHUNK;
+/// Share of an iteration's progress that the light side stands for.
+const LIGHT_SHARE: f64 = 0.3;
+
+/// The machine, and the memory that it keeps between iterations.
+pub struct Bidirectional<'a> {
+    world: &'a World<'a>,
+    settings: &'a Settings,
+    recipe: Recipe,
+    techniques: Techniques,
+    light_subpaths: u64,
+    cache: LightCache,
+    bvh: VertexBvh,
+}
+
+impl<'a> Bidirectional<'a> {
+    /// Prepares a recipe: a pre-pass over light subpaths sets the constants of roulette and weights.
+    pub fn new(world: &'a World<'a>, settings: &'a Settings, recipe: Recipe) -> Self {
+        let film = &world.scene.film;
+        let samples = u64::from(film.width) * u64::from(film.height) * u64::from(settings.samples);
+        let light_subpaths = match (recipe.base, settings.light_subpaths) {
+            (Base::OwnPath, _) | (_, 0) => samples,
+            (_, n) => n,
+        };
+        let mut machine = Self {
+            world,
+            settings,
+            recipe,
+            techniques: Techniques::default(),
+            light_subpaths,
+            cache: LightCache::default(),
+            bvh: VertexBvh::new(),
+        };
+        machine.techniques = machine.plan();
+        machine
+    }
+
+    /// How often each technique tries, per eye sample.
+    fn plan(&self) -> Techniques {
+        let (recipe, n_l) = (&self.recipe, self.light_subpaths as f64);
+        let eye_samples = f64::from(self.settings.samples);
+        // The weights must not depend on an iteration's own number of vertices, hence a pre-pass of its own numbers.
+        let vertices = (n_l * self.vertices_per_subpath()).max(1.0);
+        let on = |switch: bool, m: f64| if switch { m } else { 0.0 };
+        Techniques {
+            eye_hits: on(recipe.eye_subpaths, 1.0),
+            next_event: on(recipe.next_event, 1.0),
+            light_image: on(recipe.light_image, n_l / eye_samples),
+            base: match recipe.base {
+                Base::Off => 0.0,
+                Base::OwnPath => 1.0,
+                Base::Uniform => f64::from(self.settings.connections) * n_l / vertices,
+            },
+            roulette: recipe.roulette.then(|| Roulette {
+                light_subpaths: n_l,
+                constant: self.settings.expected * self.world.scene.mesh.total_area() / vertices,
+                max_alpha: self.settings.hrr_alpha,
+            }),
+        }
+    }
+
+    fn vertices_per_subpath(&self) -> f64 {
+        if !self.keeps_vertices() {
+            return 0.0;
+        }
+        let stored: usize = (0..PILOT / CHUNK)
+            .into_par_iter()
+            .map(|chunk| {
+                let mut cache = LightCache::default();
+                self.trace_light(Stream::Pilot, 0, chunk * CHUNK..(chunk + 1) * CHUNK, &mut cache, None);
+                cache.len()
+            })
+            .sum();
+        stored as f64 / PILOT as f64
+    }
+
+    fn keeps_vertices(&self) -> bool {
+        self.recipe.base != Base::Off || self.recipe.roulette
+    }
+
+    /// Traces light subpaths, storing their vertices and connecting them to the camera.
+    fn trace_light(
+        &self,
+        stream: Stream,
+        iteration: u64,
+        subpaths: std::ops::Range<u64>,
+        cache: &mut LightCache,
+        film: Option<&Film>,
+    ) -> Tally {
+        let (world, start) = (self.world, Instant::now());
+        let mut tally = Tally { light_subpaths: subpaths.end - subpaths.start, ..Tally::default() };
+        cache.clear();
+        for index in subpaths {
+            let sampler = Sampler::new(self.settings.seed, iteration, stream, index);
+            let mut walk = from_light::emit(world, &sampler, self.techniques.eye_hits);
+            while let Some(light) = walk.filter(|light| light.depth < self.settings.max_depth) {
+                if !light.vertex.bsdf.is_delta() {
+                    if self.keeps_vertices() && light.depth + 2 <= self.settings.max_depth {
+                        cache.push(&light);
+                    }
+                    if let Some(film) = film.filter(|_| self.recipe.light_image)
+                        && let Some((raster, value, ray)) =
+                            connect::connect_camera(world, &self.techniques, &light)
+                        && tally.connection(!world.visibility.occluded(&ray))
+                    {
+                        film.add(raster, value);
+                    }
+                }
+                walk = self.techniques.next_light(world, &light, &sampler);
+            }
+            cache.end_subpath();
+        }
+        tally.light_vertices = cache.len() as u64;
+        tally.light_trace = start.elapsed().as_secs_f64();
+        tally
+    }
+
+    /// The light pass of an iteration: fills the cache, in the order of the subpaths.
+    fn light_pass(&mut self, iteration: u64, film: &Film) -> Tally {
+        let parts: Vec<(LightCache, Tally)> = (0..self.light_subpaths.div_ceil(CHUNK))
+            .into_par_iter()
+            .map(|chunk| {
+                let mut cache = LightCache::default();
+                let range = chunk * CHUNK..((chunk + 1) * CHUNK).min(self.light_subpaths);
+                let tally = self.trace_light(Stream::Light, iteration, range, &mut cache, Some(film));
+                (cache, tally)
+            })
+            .collect();
+        self.cache.clear();
+        let mut tally = Tally::default();
+        for (part, part_tally) in &parts {
+            self.cache.append(part);
+            tally.add(part_tally);
+        }
+        tally
+    }
+
+    /// What an eye sample sees.
+    fn radiance(&self, sample: &Sample, clock: Clock, tally: &mut Tally) -> Spectrum {
+        let (world, techniques) = (self.world, &self.techniques);
+        let mut sum = Spectrum::ZERO;
+        let mut eye = EyeVertex::first(world, techniques, sample.raster);
+        while let Some(vertex) = eye {
+            sum += vertex.emitted(world, techniques);
+            if !self.recipe.eye_subpaths || vertex.walk.depth == self.settings.max_depth {
+                break;
+            }
+            if !vertex.walk.vertex.bsdf.is_delta() {
+                sum += self.next_event(&vertex, sample, clock, tally);
+                sum += if vertex.lobe.is_some() {
+                    self.play_roulette(&vertex, sample, clock, tally)
+                } else {
+                    self.connect_base(&vertex, sample, clock, tally)
+                };
+            }
+            eye = vertex.next(world, techniques, &sample.sampler);
+        }
+        sum
+    }
+
+    /// Counts a connection's value if its ray is free.
+    fn if_visible(
+        &self,
+        connection: Option<(Spectrum, crate::visibility::Ray)>,
+        clock: Clock,
+        tally: &mut Tally,
+    ) -> Spectrum {
+        let Some((value, ray)) = connection else { return Spectrum::ZERO };
+        let free = clock.time(&mut tally.visibility, || !self.world.visibility.occluded(&ray));
+        if tally.connection(free) { value } else { Spectrum::ZERO }
+    }
+
+    fn next_event(&self, vertex: &EyeVertex, sample: &Sample, clock: Clock, tally: &mut Tally) -> Spectrum {
+        self.if_visible(vertex.next_event(self.world, &self.techniques, &sample.sampler), clock, tally)
+    }
+
+    /// Connections to the sample's own light subpath, or to uniform picks from the cache.
+    fn connect_base(&self, vertex: &EyeVertex, sample: &Sample, clock: Clock, tally: &mut Tally) -> Spectrum {
+        let (stored, depth) = (self.cache.len(), vertex.walk.depth);
+        let picks = if self.recipe.base == Base::Uniform { self.settings.connections } else { 0 };
+        let picked = (0..picks).filter(|_| stored > 0).map(|n| {
+            let u = sample.sampler.nth(depth, Purpose::CachePick, n);
+            ((u * stored as f64) as usize).min(stored - 1)
+        });
+        let (own, tries) = match self.recipe.base {
+            Base::OwnPath => (self.cache.subpath(sample.index as usize), 1.0),
+            _ => (0..0, f64::from(picks) * self.light_subpaths as f64 / stored as f64),
+        };
+        let mut sum = Spectrum::ZERO;
+        for index in own.chain(picked) {
+            if depth + 1 + self.cache.depth(index) <= self.settings.max_depth {
+                let light = self.cache.load(self.world, index);
+                let connection = vertex.connect(&self.techniques, &light, self.techniques.base, tries);
+                sum += self.if_visible(connection, clock, tally);
+            }
+        }
+        sum
+    }
+
+    /// Connections to what the roulette keeps of all light vertices.
+    fn play_roulette(
+        &self,
+        vertex: &EyeVertex,
+        sample: &Sample,
+        clock: Clock,
+        tally: &mut Tally,
+    ) -> Spectrum {
+        let (Some(lobe), Some(roulette)) = (&vertex.lobe, &self.techniques.roulette) else {
+            return Spectrum::ZERO;
+        };
+        let depth = vertex.walk.depth;
+        let key = sample.sampler.bits(depth, Purpose::Roulette);
+        let position = vertex.walk.vertex.point.position;
+        let query = Query::new(position, std::slice::from_ref(lobe), roulette.constant, key);
+        let mut kept = Vec::new();
+        let Tally { roulette: counters, roulette_seconds, .. } = tally;
+        clock.time(roulette_seconds, || {
+            roulette::query(&self.bvh, &query, counters, &mut |index, p| kept.push((index, p)));
+        });
+        let mut sum = Spectrum::ZERO;
+        for (index, p) in kept {
+            if depth + 1 + self.cache.depth(index as usize) <= self.settings.max_depth {
+                let light = self.cache.load(self.world, index as usize);
+                let m = roulette.light_subpaths * p;
+                sum += self.if_visible(vertex.connect(&self.techniques, &light, m, m), clock, tally);
+            }
+        }
+        sum
+    }
+}
+
+impl Integrator for Bidirectional<'_> {
+    fn iterate(&mut self, iteration: u64, film: &mut Film, progress: &(dyn Fn(f64) + Sync)) -> Result<Tally> {
+        let mut tally = self.light_pass(iteration, film);
+        if self.recipe.roulette {
+            let start = Instant::now();
+            self.bvh.build(self.cache.positions())?;
+            tally.vertex_bvh_build += start.elapsed().as_secs_f64();
+        }
+        progress(LIGHT_SHARE);
+        let key = (self.settings.seed, iteration, self.settings.samples);
+        let on_eye_side = |fraction| progress(LIGHT_SHARE + (1.0 - LIGHT_SHARE) * fraction);
+        tally.add(&tile::sample_film(film, key, &on_eye_side, |sample, clock, tally| {
+            self.radiance(sample, clock, tally)
+        }));
+        film.count_samples(u64::from(self.settings.samples));
+        Ok(tally)
+    }
+
+    fn bytes(&self) -> (usize, usize) {
+        (self.cache.bytes(), self.bvh.bytes())
+    }
+}

@@ -1,0 +1,100 @@
+//! Path tracing with next-event estimation: code of its own, so that it can bear witness against the bidirectional
+//! machine.
+
+use super::Integrator;
+use super::tile::{self, Sample};
+use crate::bsdf::Transport;
+use crate::error::Result;
+use crate::film::Film;
+use crate::math::Spectrum;
+use crate::sampler::{Purpose, Sampler};
+use crate::settings::Settings;
+use crate::subpath::{Vertex, World};
+use crate::tally::{Clock, Tally};
+use crate::visibility::offset;
+
+/// The path tracer.
+pub struct PathTracer<'a> {
+    world: &'a World<'a>,
+    settings: &'a Settings,
+}
+
+impl<'a> PathTracer<'a> {
+    /// A path tracer for a world.
+    pub fn new(world: &'a World<'a>, settings: &'a Settings) -> Self {
+        Self { world, settings }
+    }
+
+    fn radiance(&self, sample: &Sample, clock: Clock, tally: &mut Tally) -> Spectrum {
+        let world = self.world;
+        let mut direction = world.camera.direction(sample.raster);
+        let mut origin = world.camera.position;
+        let mut ray = offset::from_free_point(origin, direction);
+        let (mut sum, mut throughput) = (Spectrum::ZERO, Spectrum::ONE);
+        // Density of the last direction; `None` when next-event estimation could not have found what it hits.
+        let mut pdf_direction = None;
+        for depth in 1..=self.settings.max_depth {
+            let Some(point) = world.intersect(&ray, origin, direction) else { break };
+            if let Some(emitter) = world.lights.at(&point) {
+                let weight = pdf_direction.map_or(1.0, |pdf_w: f64| {
+                    let distance2 = (point.position - origin).length_squared();
+                    let pdf_light = emitter.pdf_a * distance2 / point.ng.dot(direction).abs();
+                    pdf_w / (pdf_w + pdf_light)
+                });
+                sum += throughput * emitter.radiance(-direction) * weight;
+            }
+            if depth == self.settings.max_depth {
+                break;
+            }
+            let vertex = Vertex::new(world, point, -direction);
+            if !vertex.bsdf.is_delta() {
+                sum += throughput * self.direct(&vertex, &sample.sampler, depth, clock, tally);
+            }
+            let Some(s) = vertex.sample(Transport::Radiance, &sample.sampler, depth) else { break };
+            throughput *= s.weight;
+            pdf_direction = (!s.delta).then_some(s.pdf);
+            (origin, direction) = (point.position, s.wi);
+            ray = offset::leave(&point, direction);
+        }
+        sum
+    }
+
+    /// Light straight from an emitter, weighted against hitting the same point by scattering.
+    fn direct(
+        &self,
+        vertex: &Vertex,
+        sampler: &Sampler,
+        depth: u32,
+        clock: Clock,
+        tally: &mut Tally,
+    ) -> Spectrum {
+        let (pick, u) = (sampler.u1(depth, Purpose::LightPick), sampler.u2(depth, Purpose::LightPoint));
+        let Some(emitter) = self.world.lights.sample_point(pick, u) else { return Spectrum::ZERO };
+        let to = emitter.point.position - vertex.point.position;
+        let distance2 = to.length_squared();
+        if distance2 == 0.0 {
+            return Spectrum::ZERO;
+        }
+        let wi = to / distance2.sqrt();
+        let (factor, pdf_w) = vertex.toward_light(wi);
+        let value = factor * vertex.cos_ng(wi) * emitter.radiance(-wi);
+        if value == Spectrum::ZERO {
+            return value;
+        }
+        let pdf_light = emitter.pdf_a * distance2 / emitter.point.ng.dot(wi).abs();
+        let ray = offset::between(&vertex.point, &emitter.point);
+        let free = clock.time(&mut tally.visibility, || !self.world.visibility.occluded(&ray));
+        if tally.connection(free) { value / (pdf_light + pdf_w) } else { Spectrum::ZERO }
+    }
+}
+
+impl Integrator for PathTracer<'_> {
+    fn iterate(&mut self, iteration: u64, film: &mut Film, progress: &(dyn Fn(f64) + Sync)) -> Result<Tally> {
+        let key = (self.settings.seed, iteration, self.settings.samples);
+        let tally = tile::sample_film(film, key, progress, |sample, clock, tally| {
+            self.radiance(sample, clock, tally)
+        });
+        film.count_samples(u64::from(self.settings.samples));
+        Ok(tally)
+    }
+}

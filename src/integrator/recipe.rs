@@ -1,0 +1,49 @@
+//! The recipes of the bidirectional machine, as a table: name -> switches.
+
+use crate::settings::Integrator;
+
+/// Which light-side vertices an eye vertex is connected to, where the roulette is off.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Base {
+    /// None.
+    Off,
+    /// All of one light subpath that belongs to the eye sample alone.
+    OwnPath,
+    /// Uniform picks from the cache.
+    Uniform,
+}
+
+/// What an algorithm switches on.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Recipe {
+    /// Eye subpaths go on beyond what the camera sees, and may hit emitters (s = 0).
+    pub eye_subpaths: bool,
+    /// Next-event estimation (s = 1).
+    pub next_event: bool,
+    /// Light vertices seen by the camera (s = k-1).
+    pub light_image: bool,
+    /// Connections of surface vertices (2 <= s <= k-2).
+    pub base: Base,
+    /// Hierarchical Russian roulette over all light vertices at glossy eye vertices.
+    pub roulette: bool,
+}
+
+impl Recipe {
+    /// The switches of an integrator; `None` for path tracing, which is code of its own. `Auto` means `lvc+hrr`.
+    pub fn of(integrator: Integrator) -> Option<Self> {
+        let all = Self {
+            eye_subpaths: true,
+            next_event: true,
+            light_image: true,
+            base: Base::Uniform,
+            roulette: false,
+        };
+        match integrator {
+            Integrator::Pt => None,
+            Integrator::Lt => Some(Self { eye_subpaths: false, next_event: false, base: Base::Off, ..all }),
+            Integrator::Bpt => Some(Self { base: Base::OwnPath, ..all }),
+            Integrator::Lvc => Some(all),
+            Integrator::LvcHrr | Integrator::Auto => Some(Self { roulette: true, ..all }),
+        }
+    }
+}

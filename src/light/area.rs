@@ -1,0 +1,157 @@
+//! Emitting triangles: a point is picked with probability proportional to power, uniformly over the area; directions
+//! follow the cosine law. Next-event estimation and emission use the same density of points.
+
+use crate::geometry::{Mesh, SurfacePoint};
+use crate::material::Material;
+use crate::math::{Discrete, Frame, Spectrum, luminance, warp};
+use glam::{DVec2, DVec3};
+use std::f64::consts::PI;
+
+const NOT_EMITTING: u32 = u32::MAX;
+
+/// All emitting triangles of a scene.
+#[derive(Debug, Clone, Default)]
+pub struct Lights {
+    emitters: Vec<Emitter>,
+    pick: Discrete,
+    of_triangle: Vec<u32>,
+}
+
+#[derive(Debug, Clone)]
+struct Emitter {
+    triangle: u32,
+    corners: [DVec3; 3],
+    frame: Frame,
+    error: f64,
+    emission: Spectrum,
+    two_sided: bool,
+    /// Density of points over this triangle, pick included, 1/m^2.
+    pdf_a: f64,
+}
+
+/// A point on an emitter.
+#[derive(Debug, Clone, Copy)]
+pub struct EmitterPoint {
+    /// Where; the shading frame is the face's own.
+    pub point: SurfacePoint,
+    /// Radiance on each emitting side, W/(m^2 sr).
+    pub emission: Spectrum,
+    /// Whether the back face emits as well.
+    pub two_sided: bool,
+    /// Density of the point over all emitters' area, 1/m^2.
+    pub pdf_a: f64,
+}
+
+impl Lights {
+    /// Collects the emitting triangles. Degenerate ones emit nothing.
+    pub fn new(mesh: &Mesh, materials: &[Material]) -> Self {
+        let mut emitters = Vec::new();
+        let mut weights = Vec::new();
+        let mut of_triangle = Vec::new();
+        for triangle in 0..mesh.triangles.len() as u32 {
+            let material = &materials[mesh.materials[triangle as usize] as usize];
+            let (area, corners) = (mesh.area(triangle), mesh.corners(triangle));
+            let sides = if material.two_sided_emission { 2.0 } else { 1.0 };
+            let power = PI * sides * area * luminance(material.emission);
+            if !(power > 0.0) {
+                continue;
+            }
+            if of_triangle.is_empty() {
+                of_triangle = vec![NOT_EMITTING; mesh.triangles.len()];
+            }
+            of_triangle[triangle as usize] = emitters.len() as u32;
+            weights.push(power);
+            emitters.push(Emitter {
+                triangle,
+                corners,
+                frame: Frame::from_z(mesh.scaled_normal(triangle).normalize()),
+                error: SurfacePoint::error_on(&corners),
+                emission: material.emission,
+                two_sided: material.two_sided_emission,
+                pdf_a: 1.0 / area,
+            });
+        }
+        let pick = Discrete::new(weights).unwrap_or_default();
+        for (i, emitter) in emitters.iter_mut().enumerate() {
+            emitter.pdf_a *= pick.probability(i);
+        }
+        Self { emitters, pick, of_triangle }
+    }
+
+    /// True when nothing emits.
+    pub fn is_empty(&self) -> bool {
+        self.emitters.is_empty()
+    }
+
+    /// Number of emitting triangles.
+    pub fn len(&self) -> usize {
+        self.emitters.len()
+    }
+
+    /// A point on some emitter, `None` when there is none. `pick` and `u` are uniform in [0,1).
+    pub fn sample_point(&self, pick: f64, u: DVec2) -> Option<EmitterPoint> {
+        if self.emitters.is_empty() {
+            return None;
+        }
+        let emitter = &self.emitters[self.pick.sample(pick)];
+        let uv = warp::square_to_triangle(u);
+        let [a, b, c] = emitter.corners;
+        let position = a * (1.0 - uv.x - uv.y) + b * uv.x + c * uv.y;
+        let point = SurfacePoint {
+            position,
+            ng: emitter.frame.z,
+            frame: emitter.frame,
+            uv,
+            barycentric: uv,
+            triangle: emitter.triangle,
+            error: emitter.error,
+        };
+        Some(emitter.at(point))
+    }
+
+    /// The emitter's side of a point that a path has hit, `None` when its triangle does not emit.
+    pub fn at(&self, point: &SurfacePoint) -> Option<EmitterPoint> {
+        match self.of_triangle.get(point.triangle as usize) {
+            None | Some(&NOT_EMITTING) => None,
+            Some(&i) => Some(self.emitters[i as usize].at(*point)),
+        }
+    }
+}
+
+impl Emitter {
+    fn at(&self, point: SurfacePoint) -> EmitterPoint {
+        EmitterPoint { point, emission: self.emission, two_sided: self.two_sided, pdf_a: self.pdf_a }
+    }
+}
+
+impl EmitterPoint {
+    /// Radiance towards a unit direction, W/(m^2 sr).
+    pub fn radiance(&self, direction: DVec3) -> Spectrum {
+        if self.two_sided || self.point.ng.dot(direction) > 0.0 { self.emission } else { Spectrum::ZERO }
+    }
+
+    /// Density of [`EmitterPoint::sample_direction`], 1/sr.
+    pub fn pdf_w(&self, direction: DVec3) -> f64 {
+        let cos = self.point.ng.dot(direction);
+        if self.two_sided {
+            0.5 * warp::cosine_hemisphere_pdf(cos.abs())
+        } else {
+            warp::cosine_hemisphere_pdf(cos)
+        }
+    }
+
+    /// A direction in which the point emits; `u` is uniform in the unit square. `None` on the horizon.
+    pub fn sample_direction(&self, mut u: DVec2) -> Option<DVec3> {
+        let mut side = 1.0;
+        if self.two_sided {
+            u.x *= 2.0;
+            if u.x >= 1.0 {
+                u.x -= 1.0;
+                side = -1.0;
+            }
+        }
+        let local = warp::square_to_cosine_hemisphere(u);
+        (local.z > 0.0)
+            .then(|| Frame::from_z(self.point.ng).to_world(DVec3::new(local.x, local.y, side * local.z)))
+    }
+}

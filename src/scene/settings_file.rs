@@ -1,0 +1,111 @@
+//! The TOML file of a scene: `obj`, `[camera]`, `[film]`, `[render]`, `[material.NAME]` and `[[light]]`.
+
+use super::camera_keys::CameraKeys;
+use super::document::{At, Node, Table};
+use super::material_keys::MaterialKeys;
+use super::{FilmSettings, Filter};
+use crate::error::Result;
+use crate::settings::{SettingError, Settings};
+
+const LIGHT_TYPES: [&str; 4] = ["point", "spot", "directional", "environment"];
+/// Pixels across or down.
+const MAX_PIXELS: u32 = 65536;
+
+/// What the file says, checked as far as that goes without the geometry.
+#[derive(Debug)]
+pub(super) struct SettingsFile {
+    /// OBJ files as written.
+    pub(super) objs: Vec<(String, At)>,
+    /// The camera.
+    pub(super) camera: CameraKeys,
+    /// The image.
+    pub(super) film: FilmSettings,
+    /// The render.
+    pub(super) settings: Settings,
+    /// Materials that take the place of the MTL's.
+    pub(super) materials: Vec<MaterialKeys>,
+}
+
+impl SettingsFile {
+    /// Reads a document's keys.
+    pub(super) fn read(document: &Table) -> Result<Self> {
+        document.only("the scene", &["obj", "camera", "film", "render", "material", "light"])?;
+        let empty = Table::default();
+        let section =
+            |name: &str| document.get(name).map_or(Ok(&empty), |node| node.table(&format!("[{name}]")));
+        if let Some(lights) = document.get("light") {
+            refuse_lights(lights)?;
+        }
+        let materials =
+            section("material")?.entries().iter().map(MaterialKeys::read).collect::<Result<_>>()?;
+        Ok(Self {
+            objs: document.get("obj").map_or(Ok(Vec::new()), objs)?,
+            camera: CameraKeys::read(section("camera")?)?,
+            film: film(section("film")?)?,
+            settings: settings(section("render")?)?,
+            materials,
+        })
+    }
+}
+
+fn objs(node: &Node) -> Result<Vec<(String, At)>> {
+    if let Ok(one) = node.string("obj") {
+        return Ok(vec![(one.to_owned(), node.at.clone())]);
+    }
+    node.array("obj")?.iter().map(|n| Ok((n.string("obj")?.to_owned(), n.at.clone()))).collect()
+}
+
+fn film(table: &Table) -> Result<FilmSettings> {
+    table.only("[film]", &["width", "height", "filter"])?;
+    let mut film = FilmSettings::default();
+    for (key, side) in [("width", &mut film.width), ("height", &mut film.height)] {
+        if let Some(node) = table.get(key) {
+            *side = node.integer(&format!("film.{key}"), 1..=MAX_PIXELS)?;
+        }
+    }
+    if let Some(node) = table.get("filter") {
+        film.filter = match node.string("film.filter")? {
+            "box" => Filter::Box,
+            "gaussian" => Filter::Gaussian,
+            other => {
+                return Err(node.at.error(format!("film.filter is \"{other}\"; it must be box or gaussian")));
+            }
+        }
+    }
+    Ok(film)
+}
+
+fn settings(table: &Table) -> Result<Settings> {
+    let mut settings = Settings::default();
+    for entry in table.entries() {
+        let Some(value) = entry.node.plain() else {
+            return Err(entry.node.at.error(format!("render.{} takes a single value", entry.key)));
+        };
+        settings.set(&entry.key, &value).map_err(|e| match e {
+            SettingError::Invalid(message) => entry.at.error(message),
+            SettingError::NotYet(message) => entry.at.unsupported(message),
+        })?;
+    }
+    Ok(settings)
+}
+
+/// Only emitting triangles give light so far.
+fn refuse_lights(lights: &Node) -> Result<()> {
+    for light in lights.array("[[light]]")? {
+        let table = light.table("[[light]]")?;
+        let Some(kind) = table.get("type") else {
+            return Err(light.at.error(format!("[[light]] needs a type: {}", LIGHT_TYPES.join(", "))));
+        };
+        let name = kind.string("light.type")?;
+        return Err(if LIGHT_TYPES.contains(&name) {
+            kind.at.unsupported(format!("{name} lights; give a material an emission instead"))
+        } else {
+            let hint = super::notes::suggestion(name, LIGHT_TYPES);
+            kind.at.error(format!(
+                "light.type is \"{name}\"; it must be one of {}{hint}",
+                LIGHT_TYPES.join(", ")
+            ))
+        });
+    }
+    Ok(())
+}

@@ -1,0 +1,179 @@
+//! One row for every setting.
+
+use super::{Backend, Integrator, Kind, Setting};
+
+const TRANSPORT: &str = "Light transport";
+const BUDGET: &str = "Budget and randomness";
+const MACHINE: &str = "Machine";
+
+/// All settings. Of `iterations` and `time`, the one that is set last is in force.
+pub const TABLE: &[Setting] = &[
+    Setting {
+        name: "integrator",
+        kind: Kind::Choice {
+            names: &Integrator::NAMES,
+            planned: &Integrator::PLANNED,
+            get: |s| s.integrator as usize,
+            set: |s, i| s.integrator = Integrator::ALL[i],
+        },
+        default: "auto",
+        value_name: "NAME",
+        heading: TRANSPORT,
+        help: "How light is transported",
+        doc: "pt: path tracing with next-event estimation. lt: light tracing. bpt: bidirectional path tracing. \
+              lvc: eye subpaths connected to uniform picks from a cache of light vertices. lvc+hrr: as lvc, with \
+              hierarchical Russian roulette at glossy eye vertices. auto: chosen from what the scene contains.",
+    },
+    Setting {
+        name: "max_depth",
+        kind: Kind::Integer {
+            min: 1,
+            max: 65535,
+            get: |s| s.max_depth.into(),
+            set: |s, v| s.max_depth = v as u32,
+        },
+        default: "24",
+        value_name: "N",
+        heading: TRANSPORT,
+        help: "Longest path, in segments",
+        doc: "1: only emitters seen directly; 2: direct light as well; and so on.",
+    },
+    Setting {
+        name: "samples",
+        kind: Kind::Integer {
+            min: 1,
+            max: 65535,
+            get: |s| s.samples.into(),
+            set: |s, v| s.samples = v as u32,
+        },
+        default: "1",
+        value_name: "N",
+        heading: TRANSPORT,
+        help: "Eye samples per pixel in each iteration",
+        doc: "",
+    },
+    Setting {
+        name: "light_subpaths",
+        kind: Kind::Integer {
+            min: 0,
+            max: u32::MAX as u64,
+            get: |s| s.light_subpaths,
+            set: |s, v| s.light_subpaths = v,
+        },
+        default: "0",
+        value_name: "N",
+        heading: TRANSPORT,
+        help: "Light subpaths in each iteration; 0: as many as pixels",
+        doc: "",
+    },
+    Setting {
+        name: "connections",
+        kind: Kind::Integer {
+            min: 1,
+            max: 65535,
+            get: |s| s.connections.into(),
+            set: |s, v| s.connections = v as u32,
+        },
+        default: "1",
+        value_name: "N",
+        heading: TRANSPORT,
+        help: "Connections that uniform picks (lvc) try at each eye vertex",
+        doc: "",
+    },
+    Setting {
+        name: "expected",
+        kind: Kind::Real { min: 1e-6, max: 1e6, get: |s| Some(s.expected), set: |s, v| s.expected = v },
+        default: "1.0",
+        value_name: "K",
+        heading: TRANSPORT,
+        help: "Light vertices that the roulette (+hrr) keeps on average",
+        doc: "The expected number of accepted light vertices at an eye vertex where no acceptance probability \
+              reaches 1. More of them lower the noise of each iteration and make it slower.",
+    },
+    Setting {
+        name: "hrr_alpha",
+        kind: Kind::Real { min: 0.0, max: 1.0, get: |s| Some(s.hrr_alpha), set: |s, v| s.hrr_alpha = v },
+        default: "0.3",
+        value_name: "ALPHA",
+        heading: TRANSPORT,
+        help: "Largest GGX roughness at which the roulette is used",
+        doc: "",
+    },
+    Setting {
+        name: "iterations",
+        kind: Kind::Integer {
+            min: 1,
+            max: i64::MAX as u64,
+            get: |s| s.iterations,
+            set: |s, v| {
+                s.iterations = v;
+                s.time = None;
+            },
+        },
+        default: "64",
+        value_name: "N",
+        heading: BUDGET,
+        help: "Iterations to run",
+        doc: "",
+    },
+    Setting {
+        name: "time",
+        kind: Kind::Real { min: 1e-3, max: 1e9, get: |s| s.time, set: |s, v| s.time = Some(v) },
+        default: "",
+        value_name: "SECONDS",
+        heading: BUDGET,
+        help: "Seconds of rendering, instead of a number of iterations",
+        doc: "The iteration that is under way when the time is up is finished.",
+    },
+    Setting {
+        name: "first_iteration",
+        kind: Kind::Integer {
+            min: 0,
+            max: i64::MAX as u64,
+            get: |s| s.first_iteration,
+            set: |s, v| s.first_iteration = v,
+        },
+        default: "0",
+        value_name: "N",
+        heading: BUDGET,
+        help: "Number of the first iteration",
+        doc: "Each iteration has its own random numbers: iterations 0..4 and 4..8 add up to 0..8.",
+    },
+    Setting {
+        name: "seed",
+        kind: Kind::Integer { min: 0, max: i64::MAX as u64, get: |s| s.seed, set: |s, v| s.seed = v },
+        default: "0",
+        value_name: "N",
+        heading: BUDGET,
+        help: "Seed of all random numbers",
+        doc: "",
+    },
+    Setting {
+        name: "visibility",
+        kind: Kind::Choice {
+            names: &Backend::NAMES,
+            planned: &[],
+            get: |s| s.visibility as usize,
+            set: |s, i| s.visibility = Backend::ALL[i],
+        },
+        default: if cfg!(feature = "embree") { "embree" } else { "obvhs" },
+        value_name: "NAME",
+        heading: MACHINE,
+        help: "What answers ray queries",
+        doc: "embree: Intel Embree. obvhs: pure Rust. brute: every triangle, for tests.",
+    },
+    Setting {
+        name: "threads",
+        kind: Kind::Integer {
+            min: 0,
+            max: 1024,
+            get: |s| s.threads as u64,
+            set: |s, v| s.threads = v as usize,
+        },
+        default: "0",
+        value_name: "N",
+        heading: MACHINE,
+        help: "Threads; 0: all",
+        doc: "The image does not depend on it.",
+    },
+];

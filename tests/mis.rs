@@ -1,0 +1,235 @@
+//! The weights of multiple importance sampling against their definition: on random paths through a scene with every
+//! kind of material, each technique's weight by the recursion must be its density over the sum of all densities, which
+//! are multiplied out here vertex by vertex.
+
+use crate::support::scenes;
+use glam::{DVec2, DVec3};
+use hrr::bsdf::Transport;
+use hrr::connect::{EyeVertex, Roulette, Techniques, connect_camera};
+use hrr::light::EmitterPoint;
+use hrr::math::Spectrum;
+use hrr::sampler::{Purpose, Sampler, Stream};
+use hrr::settings::{Backend, Settings};
+use hrr::subpath::{Vertex, Walk, World, from_light};
+
+/// Numbers with no special relation to each other.
+const TECHNIQUES: Techniques = Techniques {
+    eye_hits: 1.0,
+    next_event: 1.0,
+    light_image: 700.0,
+    base: 1.7,
+    roulette: Some(Roulette { light_subpaths: 1400.0, constant: 0.02, max_alpha: 0.3 }),
+};
+
+/// A whole path: a point on an emitter, surface vertices from the light's side, the camera.
+struct Path {
+    emitter: EmitterPoint,
+    surfaces: Vec<Vertex>,
+}
+
+impl Path {
+    fn position(&self, world: &World<'_>, i: usize) -> DVec3 {
+        match i {
+            0 => self.emitter.point.position,
+            i if i <= self.surfaces.len() => self.surfaces[i - 1].point.position,
+            _ => world.camera.position,
+        }
+    }
+
+    fn to(&self, world: &World<'_>, from: usize, to: usize) -> DVec3 {
+        (self.position(world, to) - self.position(world, from)).normalize()
+    }
+
+    /// |cos| at vertex `at` of the edge from vertex `from`, over their squared distance.
+    fn g(&self, world: &World<'_>, from: usize, at: usize) -> f64 {
+        let d = self.position(world, at) - self.position(world, from);
+        let ng = if at == 0 { self.emitter.point.ng } else { self.surfaces[at - 1].point.ng };
+        ng.dot(d).abs() / d.length() / d.length_squared()
+    }
+
+    /// Density of scattering at surface vertex `i`, coming from one neighbour, to the other, 1/sr.
+    fn pdf_w(&self, world: &World<'_>, i: usize, from: usize, to: usize) -> f64 {
+        let vertex = &self.surfaces[i - 1];
+        let (from, to) = (self.to(world, i, from), self.to(world, i, to));
+        if !vertex.bsdf.is_delta() {
+            return vertex.pdf_w(from, to);
+        }
+        // A delta lobe's density is told by sampling it.
+        let local = vertex.frame.to_local(from);
+        [0.0, 1.0 - 1e-12]
+            .into_iter()
+            .filter_map(|lobe| vertex.bsdf.sample(local, Transport::Radiance, lobe, DVec2::ZERO))
+            .find(|s| (vertex.frame.to_world(s.wi) - to).length() < 1e-6)
+            .map_or(0.0, |s| s.pdf * vertex.bsdf.survival())
+    }
+
+    /// Densities of all techniques s = 0 .. k-1, up to a common factor.
+    fn densities(&self, world: &World<'_>, t: &Techniques) -> Vec<f64> {
+        let k = self.surfaces.len() + 2;
+        let delta = |i: usize| i >= 1 && i <= k - 2 && self.surfaces[i - 1].bsdf.is_delta();
+        let fw = |i: usize| match i {
+            0 => self.emitter.pdf_a,
+            1 => self.emitter.pdf_w(self.to(world, 0, 1)) * self.g(world, 0, 1),
+            _ => self.pdf_w(world, i - 1, i - 2, i) * self.g(world, i - 1, i),
+        };
+        let rv = |i: usize| {
+            if i == k - 2 {
+                return world.camera.pdf_w(self.to(world, k - 1, i)) * self.g(world, k - 1, i);
+            }
+            self.pdf_w(world, i + 1, i + 2, i) * self.g(world, i + 1, i)
+        };
+        let m = |s: usize| {
+            if s == 0 {
+                return t.eye_hits;
+            }
+            if delta(s - 1) || delta(s) || k == 2 {
+                return 0.0;
+            }
+            if s == 1 {
+                return t.next_event;
+            }
+            if s == k - 1 {
+                return t.light_image;
+            }
+            let lobe = t.lobe(&self.surfaces[s - 1], self.to(world, s, s + 1));
+            let offset = self.position(world, s - 1) - self.position(world, s);
+            t.connection(lobe.as_ref(), offset)
+        };
+        (0..k).map(|s| m(s) * (0..s).map(fw).product::<f64>() * (s..k - 1).map(rv).product::<f64>()).collect()
+    }
+
+    /// The weight of technique s by definition.
+    fn weight(&self, world: &World<'_>, t: &Techniques, s: usize) -> f64 {
+        let d = self.densities(world, t);
+        d[s] / d.iter().sum::<f64>()
+    }
+}
+
+fn light_walks(world: &World<'_>, sampler: &Sampler, length: usize) -> Vec<Walk> {
+    let mut walks = Vec::new();
+    let mut walk = from_light::emit(world, sampler, TECHNIQUES.eye_hits);
+    while let Some(light) = walk.filter(|_| walks.len() < length) {
+        walks.push(light);
+        walk = TECHNIQUES.next_light(world, &light, sampler);
+    }
+    walks
+}
+
+fn eye_walks(world: &World<'_>, sampler: &Sampler, length: usize) -> Vec<EyeVertex> {
+    let mut walks = Vec::new();
+    let mut eye = EyeVertex::first(world, &TECHNIQUES, sampler.u2(0, Purpose::Raster) * 32.0);
+    while let Some(vertex) = eye.filter(|_| walks.len() < length) {
+        walks.push(vertex);
+        eye = vertex.next(world, &TECHNIQUES, sampler);
+    }
+    walks
+}
+
+fn close(what: &str, by_recursion: f64, by_definition: f64) {
+    let error = (by_recursion - by_definition).abs();
+    assert!(error < 1e-9 * by_definition.abs() + 1e-12, "{what}: {by_recursion} is not {by_definition}");
+}
+
+#[test]
+fn recursion_equals_the_definition() {
+    let scene = scenes::box_of_everything();
+    let settings = Settings { visibility: Backend::Obvhs, ..Settings::default() };
+    let world = World::new(&scene, &settings).unwrap();
+    let t = &TECHNIQUES;
+    let mut checked = [0usize; 4];
+    let mut with_delta = 0;
+    for index in 0..12_000u64 {
+        let eye_sampler = Sampler::new(1, 0, Stream::Eye, index);
+        let light_sampler = Sampler::new(1, 0, Stream::Light, index);
+        let lights = light_walks(&world, &light_sampler, (index % 5) as usize);
+        let eyes = eye_walks(&world, &eye_sampler, (index / 5 % 5) as usize);
+        // The emitter that the light walk started from is drawn by the same numbers again.
+        let start = world
+            .lights
+            .sample_point(light_sampler.u1(0, Purpose::LightPick), light_sampler.u2(0, Purpose::LightPoint))
+            .unwrap();
+        let path = |emitter: EmitterPoint, lights: &[Walk], eyes: &[EyeVertex]| Path {
+            emitter,
+            surfaces: lights
+                .iter()
+                .map(|w| w.vertex)
+                .chain(eyes.iter().rev().map(|e| e.walk.vertex))
+                .collect(),
+        };
+        let mut count = |kind: usize, path: &Path| {
+            checked[kind] += 1;
+            with_delta += usize::from(path.surfaces.iter().any(|v| v.bsdf.is_delta()));
+        };
+
+        if let Some((last, before)) = eyes.split_last() {
+            // s = 0: the eye walk ends on an emitter.
+            if let Some(emitter) = world.lights.at(&last.walk.vertex.point) {
+                let radiance = emitter.radiance(last.walk.vertex.wo);
+                if radiance != Spectrum::ZERO && !before.is_empty() {
+                    let path = path(emitter, &[], before);
+                    let got = last.emitted(&world, t).x / (last.walk.throughput.x * radiance.x);
+                    close("s = 0", got, path.weight(&world, t, 0));
+                    count(0, &path);
+                }
+            }
+            // s = 1: next-event estimation.
+            let delta = last.walk.vertex.bsdf.is_delta();
+            if let Some((value, _)) = last.next_event(&world, t, &eye_sampler).filter(|_| !delta) {
+                let depth = last.walk.depth;
+                let emitter = world
+                    .lights
+                    .sample_point(
+                        eye_sampler.u1(depth, Purpose::LightPick),
+                        eye_sampler.u2(depth, Purpose::LightPoint),
+                    )
+                    .unwrap();
+                let path = path(emitter, &[], &eyes);
+                let x = &last.walk.vertex;
+                let w = path.to(&world, 1, 0);
+                let plain = last.walk.throughput
+                    * x.factor(x.wo, w)
+                    * emitter.radiance(-w)
+                    * (x.cos_ng(w) * path.g(&world, 1, 0) / emitter.pdf_a);
+                close("s = 1", value.x / plain.x, path.weight(&world, t, 1));
+                count(1, &path);
+            }
+        }
+        if let (Some(light), Some(eye)) = (lights.last(), eyes.last())
+            && !light.vertex.bsdf.is_delta()
+            && !eye.walk.vertex.bsdf.is_delta()
+        {
+            // 2 <= s <= k-2: a connection.
+            let path = path(start, &lights, &eyes);
+            let s = lights.len() + 1;
+            let offset = light.vertex.point.position - eye.walk.vertex.point.position;
+            let m = t.connection(eye.lobe.as_ref(), offset);
+            if let Some((value, _)) = eye.connect(t, light, m, 1.0) {
+                let (y, z) = (&light.vertex, &eye.walk.vertex);
+                let w = offset.normalize();
+                let plain = eye.walk.throughput
+                    * z.factor(z.wo, w)
+                    * y.factor(-w, y.wo)
+                    * light.throughput
+                    * (z.cos_ng(w) * y.cos_ng(w) / offset.length_squared());
+                close("connection", value.x / plain.x, path.weight(&world, t, s));
+                count(2, &path);
+            }
+        }
+        if let Some(light) = lights.last().filter(|w| !w.vertex.bsdf.is_delta())
+            && let Some((_, value, _)) = connect_camera(&world, t, light)
+        {
+            // s = k-1: seen by the camera.
+            let path = path(start, &lights, &[]);
+            let k = lights.len() + 2;
+            let y = &light.vertex;
+            let w = path.to(&world, k - 2, k - 1);
+            let plain = light.throughput
+                * y.factor(w, y.wo)
+                * (path.g(&world, k - 1, k - 2) * world.camera.pdf_w(-w));
+            close("s = k-1", value.x / plain.x * t.light_image, path.weight(&world, t, k - 1));
+            count(3, &path);
+        }
+    }
+    println!("paths checked by kind of technique {checked:?}, with delta vertices {with_delta}");
+    assert!(checked.iter().all(|&n| n >= 100) && with_delta >= 100, "{checked:?} {with_delta}");
+}

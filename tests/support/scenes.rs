@@ -1,0 +1,82 @@
+//! Scenes of the tests: the project's own at any size, and small ones made in memory.
+
+use glam::{DVec3, Vec3};
+use hrr::bsdf::Reflectance;
+use hrr::geometry::Mesh;
+use hrr::material::{Material, Scattering};
+use hrr::math::Spectrum;
+use hrr::scene::{CameraSettings, FilmSettings, Scene};
+use hrr::settings::Settings;
+use std::path::Path;
+
+/// A scene of the project with some keys changed.
+pub fn load(name: &str, overrides: &[(&str, &str)]) -> Scene {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes").join(name).join("scene.toml");
+    let overrides: Vec<_> = overrides.iter().map(|(k, v)| ((*k).to_owned(), (*v).to_owned())).collect();
+    Scene::load(&path, &overrides).unwrap()
+}
+
+/// The inside of a box, two metres wide, with a side for every kind of material and a lamp under the ceiling.
+pub fn box_of_everything() -> Scene {
+    let gold = Reflectance::Schlick { f0: Spectrum::new(0.9, 0.7, 0.3) };
+    let conductor = |alpha_x, alpha_y| Scattering::Conductor { reflectance: gold, alpha_x, alpha_y };
+    let mut lamp = Material::diffuse("lamp", Spectrum::splat(0.5));
+    lamp.emission = Spectrum::new(9.0, 8.0, 7.0);
+    let mut turned = Material::new("brushed", conductor(0.05, 0.25));
+    turned.tangent_angle = 0.6;
+    let materials = vec![
+        Material::diffuse("white", Spectrum::splat(0.8)),
+        Material::new("rough metal", conductor(0.2, 0.2)),
+        turned,
+        Material::new("mirror", Scattering::Mirror { reflectance: Spectrum::splat(0.9) }),
+        Material::new("glass", Scattering::Dielectric { ior: 1.5, alpha_x: 0.0, alpha_y: 0.0 }),
+        Material::new("frosted", Scattering::Dielectric { ior: 1.5, alpha_x: 0.2, alpha_y: 0.2 }),
+        lamp,
+    ];
+    let mut mesh = Mesh::default();
+    // Floor, ceiling, left, right, back; front faces inward.
+    quad(&mut mesh, [[-1, -1, 1], [1, -1, 1], [1, -1, -1], [-1, -1, -1]], 1.0, Vec3::ZERO, 0);
+    quad(&mut mesh, [[-1, 1, -1], [1, 1, -1], [1, 1, 1], [-1, 1, 1]], 1.0, Vec3::ZERO, 1);
+    quad(&mut mesh, [[-1, -1, -1], [-1, 1, -1], [-1, 1, 1], [-1, -1, 1]], 1.0, Vec3::ZERO, 2);
+    quad(&mut mesh, [[1, -1, 1], [1, 1, 1], [1, 1, -1], [1, -1, -1]], 1.0, Vec3::ZERO, 3);
+    quad(&mut mesh, [[-1, -1, -1], [1, -1, -1], [1, 1, -1], [-1, 1, -1]], 1.0, Vec3::ZERO, 0);
+    quad(&mut mesh, [[-1, 0, -1], [1, 0, -1], [1, 0, 1], [-1, 0, 1]], 0.4, Vec3::new(0.0, 0.9, 0.0), 6);
+    cube(&mut mesh, 0.3, Vec3::new(-0.5, -0.6, 0.1), 4);
+    cube(&mut mesh, 0.25, Vec3::new(0.5, -0.6, -0.2), 5);
+    in_memory(mesh, materials, DVec3::new(0.1, 0.0, 2.6), DVec3::new(0.0, -0.1, 0.0), 60.0)
+}
+
+/// A scene of 32x32 pixels, as loaded from nowhere.
+pub fn in_memory(mesh: Mesh, materials: Vec<Material>, origin: DVec3, target: DVec3, fov_y: f64) -> Scene {
+    Scene {
+        path: "memory".into(),
+        mesh,
+        materials,
+        camera: CameraSettings { origin, target, fov_y, ..CameraSettings::default() },
+        film: FilmSettings { width: 32, height: 32, ..FilmSettings::default() },
+        settings: Settings::default(),
+        warnings: Vec::new(),
+        hash: 0,
+    }
+}
+
+/// A quadrilateral, counter-clockwise seen from its front.
+pub fn quad(mesh: &mut Mesh, corners: [[i8; 3]; 4], scale: f32, center: Vec3, material: u32) {
+    let first = mesh.positions.len() as u32;
+    mesh.positions.extend(corners.map(|c| center + scale * Vec3::from(c.map(f32::from))));
+    mesh.triangles.extend([[first, first + 1, first + 2], [first, first + 2, first + 3]]);
+    mesh.materials.extend([material; 2]);
+}
+
+fn cube(mesh: &mut Mesh, half: f32, center: Vec3, material: u32) {
+    for axis in 0..3 {
+        for side in [-1i8, 1] {
+            let corner = |u: i8, v: i8| {
+                let mut c = [0; 3];
+                (c[axis], c[(axis + 1) % 3], c[(axis + 2) % 3]) = (side, u * side, v);
+                c
+            };
+            quad(mesh, [corner(-1, -1), corner(1, -1), corner(1, 1), corner(-1, 1)], half, center, material);
+        }
+    }
+}
