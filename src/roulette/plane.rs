@@ -225,7 +225,7 @@ impl<S: Simd> Box8<S> {
         let u = t2.mul_add(lobe.a2, z * z).sqrt();
         let w = u + z.abs();
         let inv_uw = 1.0 / (u * w);
-        let (half_inv_u, t2_w) = (w * inv_uw * 0.5, t2 * u * inv_uw);
+        let (half_inv_u, t2_w) = (w * inv_uw * 0.5, t2 * (u * inv_uw));
         let side = half_inv_u * (1.0 + lobe.a2);
         let front = z.simd_gt(0.0).select(w - t2_w, t2_w * lobe.a2 - w * lobe.inv_a2);
         let (gx, gy, gz) = (x * side, y * side, front * half_inv_u);
