@@ -3,6 +3,7 @@
 mod loading;
 mod hard_cases;
 mod roulette;
+mod vertex_bvh;
 mod support;
 
 mod bsdf;

@@ -12,7 +12,7 @@ use hrr::vertex_bvh::VertexBvh;
 const RULES: [MinimumRandom; 3] =
     [MinimumRandom::Nested, MinimumRandom::SemiStratified, MinimumRandom::Exact];
 
-fn u(i: u64, k: u64) -> f64 {
+pub fn u(i: u64, k: u64) -> f64 {
     unit(mix(mix(i ^ 0x1234_5678) ^ k))
 }
 
@@ -195,7 +195,7 @@ fn acceptance_frequencies_are_the_probabilities() {
 }
 
 /// A cluster of light vertices that a lobe of roughness `alpha` sees at distance 1, and the lobe.
-fn lit_lobe(n: usize, ax: f64, ay: f64, seed: u64) -> (Vec<Vec3>, DVec3, Lobe) {
+pub fn lit_lobe(n: usize, ax: f64, ay: f64, seed: u64) -> (Vec<Vec3>, DVec3, Lobe) {
     let frame = random_frame(seed);
     let lobe = Lobe::new(frame, ax, ay, 1.0 / (ax * ay));
     // Positions near the origin, where f32 resolves the lobe; the eye vertex a unit away.

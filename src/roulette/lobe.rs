@@ -121,7 +121,7 @@ impl Lobe {
             let w = u - z;
             0.5 * (w / self.a2 + self.a2 * t2 / w)
         } else {
-            0.0
+            u // 0 at the eye vertex itself; NaN stays NaN
         }
     }
 
