@@ -3,8 +3,9 @@
 
 use glam::{DVec2, DVec3};
 use hrr::bsdf::Reflectance;
+use hrr::film::Filter;
 use hrr::material::Scattering;
-use hrr::scene::{Filter, Scene};
+use hrr::scene::Scene;
 use hrr::settings::Integrator;
 use hrr::{Error, Result};
 use std::path::{Path, PathBuf};
@@ -776,7 +777,9 @@ fn without_a_camera_everything_is_in_view() {
         files.write("s.obj", b"mtllib s.mtl\nusemtl lamp\nv -10 0 2\nv 30 0 3\nv 0 50 -7\nf 1 2 3\n");
         let flags = [("film.width", width), ("film.height", height), ("camera.fov_y", "25")];
         let scene = files.load("s.toml", &flags).unwrap();
-        let camera = hrr::camera::Camera::new(&scene.camera, &scene.film, scene.mesh.origin).unwrap();
+        let camera =
+            hrr::camera::Camera::new(&scene.camera, (scene.film.width, scene.film.height), scene.mesh.origin)
+                .unwrap();
         let mut seen = f64::INFINITY;
         for p in &scene.mesh.positions {
             let raster = camera.raster(p.as_dvec3() - camera.position).expect("in view");

@@ -15,4 +15,5 @@ mod agreement;
 mod ray_offset;
 mod visibility;
 mod determinism;
+mod layers;
 mod mis;

@@ -3,8 +3,8 @@
 use super::camera_keys::CameraKeys;
 use super::document::{At, Node, Table};
 use super::material_keys::MaterialKeys;
-use super::{FilmSettings, Filter};
 use crate::error::Result;
+use crate::film::{FilmSettings, Filter};
 use crate::settings::{SettingError, Settings};
 
 const LIGHT_TYPES: [&str; 4] = ["point", "spot", "directional", "environment"];
