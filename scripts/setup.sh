@@ -5,7 +5,7 @@
 # nothing when all is there. See docs/setup.md.
 #
 #   scripts/setup.sh             the above
-#   scripts/setup.sh --private   leave the distribution's packages alone even when root
+#   scripts/setup.sh --private   install no packages even when root
 #   scripts/setup.sh --force     look again even when an earlier run found everything
 set -euo pipefail
 
@@ -17,86 +17,101 @@ stamp=$prefix/stamp
 wheels="embreex==4.4.0.post1 --hash=sha256:2cd0f7d5c6342e6247e31f700761689cae7829454d8c6de0c41e62124a023e1f
 openimageio==3.1.18.1 --hash=sha256:f6093b80484c8df645a2168ece9f5f866153acebad97b7b2f0830945e1e5ec81
 libclang==18.1.1 --hash=sha256:c533091d8a3bbf7460a00cb6c1a71da93bffe148f172c7d03b1c31fbf8aa2a0b"
-oiio_source="openimageio==3.1.18.1 --hash=sha256:4d8b4fc876e47be47b3724c8e4a8a2fe381142cdcfd9624a23477691e58783a2"
 oiio_version=(3 1 18 1)
+oiio_source="openimageio==3.1.18.1 --hash=sha256:4d8b4fc876e47be47b3724c8e4a8a2fe381142cdcfd9624a23477691e58783a2"
 header_suite=trixie
-declare -A header_sha256=(
-    [libembree-dev]=674a8b3d1a00612f46730da29f4cc146267b4917bbf0242113d0568429e78726
-    [libimath-dev]=586350a1b47f754a63132f5aadd426d8d2cc49f00fa873a268fa84041bca0616
-    [libfmt-dev]=c084df80e2842bc57157e8def529f4ca6bc8743d005550b56a5ef96c9bc92f0f
-)
+header_sha256="libembree-dev 674a8b3d1a00612f46730da29f4cc146267b4917bbf0242113d0568429e78726
+libimath-dev 586350a1b47f754a63132f5aadd426d8d2cc49f00fa873a268fa84041bca0616
+libfmt-dev c084df80e2842bc57157e8def529f4ca6bc8743d005550b56a5ef96c9bc92f0f"
 
-private= force=
+private='' force=''
 for argument in "$@"; do
     case $argument in
     --private) private=1 ;;
     --force) force=1 ;;
-    *) echo "setup.sh: unknown argument $argument (known: --private, --force)" >&2 && exit 2 ;;
+    *) echo "setup: unknown argument $argument (known: --private, --force)" >&2 && exit 2 ;;
     esac
 done
 
-say() { echo "setup: $*"; }
+say() { echo "setup: $*" >&2; }
+# Before `exit 1`: what is missing, and the ways out.
+give_up() {
+    local name
+    say "could not bring: ${missing[*]}"
+    say "$*"
+    [ ! -s "$scratch/log" ] || tail -n 5 "$scratch/log" | sed 's/^/    /' >&2
+    for name in "${missing[@]}"; do
+        case $name in
+        embree) say "  Embree >= 4.3: package libembree-dev (Debian >= 13, Ubuntu >= 24.04), or set EMBREE4_ROOT" ;;
+        oiio) say "  OpenImageIO >= 3.1.4: where pkg-config finds it, or set OIIO_ROOT" ;;
+        libclang) say "  libclang: package libclang-dev, or set LIBCLANG_PATH to its directory" ;;
+        esac
+    done
+    say "  or build without them: cargo build --no-default-features  (docs/setup.md)"
+    exit 1
+}
 
-# The stamp's first line names this script's text and place; the others are files that must still be there.
-identity() { echo "$(cksum <"${BASH_SOURCE[0]}") ${EMBREE4_ROOT-} ${OIIO_ROOT-} ${LIBCLANG_PATH-} $root"; }
-up_to_date() {
-    local line
-    [ -r "$stamp" ] || return 1
+# The stamp's first line tells what was asked for, the others name files that must still be there.
+identity() {
+    echo "$wheels $oiio_source $header_sha256 ${EMBREE4_ROOT-} ${OIIO_ROOT-} ${LIBCLANG_PATH-}" | cksum
+}
+up_to_date() (
+    cd "$prefix" 2>/dev/null && [ -r stamp ] || return 1
     {
         read -r line && [ "$line" = "$(identity)" ] || return 1
         while read -r line; do [ -e "$line" ] || return 1; done
-    } <"$stamp"
-}
+    } <stamp
+)
 [ -z "$force" ] && up_to_date && exit 0
 
 scratch=$(mktemp -d)
 trap 'rm -rf "$scratch"' EXIT
+cxx=${CXX:-c++}
+missing=(embree oiio libclang)
+command -v "$cxx" >/dev/null || give_up "a C++ compiler is needed: package g++, or set CXX"
 
-# ---- What is there. Each prints the file that shows it.
+# ---- What is there. Each prints a file that shows it.
 
 embree_there() {
-    local flags=() header
-    [ -n "${EMBREE4_ROOT-}" ] && flags=(-I"$EMBREE4_ROOT/include" -L"$EMBREE4_ROOT/lib" -L"$EMBREE4_ROOT/lib64")
+    local flags=()
+    [ -z "${EMBREE4_ROOT-}" ] || flags=(-I"$EMBREE4_ROOT/include" -L"$EMBREE4_ROOT/lib" -L"$EMBREE4_ROOT/lib64")
     cat >"$scratch/embree.cpp" <<'END'
 #include <embree4/rtcore.h>
 static_assert(RTC_VERSION >= 40300, "too old");
 int main() { rtcReleaseDevice(rtcNewDevice(nullptr)); }
 END
-    "${CXX:-c++}" "${flags[@]}" "$scratch/embree.cpp" -lembree4 -o "$scratch/embree" 2>/dev/null || return 1
-    header=$("${CXX:-c++}" "${flags[@]}" -M "$scratch/embree.cpp" | grep -o '[^ ]*embree4/rtcore\.h' | head -n1)
-    echo "$header"
+    "$cxx" "${flags[@]}" "$scratch/embree.cpp" -lembree4 -o "$scratch/embree" 2>/dev/null || return 1
+    "$cxx" "${flags[@]}" -M "$scratch/embree.cpp" | grep -o '[^ ]*embree4/rtcore\.h' | head -n 1
 }
-
 oiio_there() {
+    local include
     if [ -n "${OIIO_ROOT-}" ]; then
-        [ -e "$OIIO_ROOT/include/OpenImageIO/imageio.h" ] && echo "$OIIO_ROOT/include/OpenImageIO/imageio.h"
+        include=$OIIO_ROOT/include
     else
-        pkg-config --atleast-version=3.1.4 OpenImageIO 2>/dev/null &&
-            echo "$(pkg-config --variable=includedir OpenImageIO)/OpenImageIO/imageio.h"
+        pkg-config --atleast-version=3.1.4 OpenImageIO 2>/dev/null || return 1
+        include=$(pkg-config --variable=includedir OpenImageIO)
     fi
+    [ -e "$include/OpenImageIO/imageio.h" ] && echo "$include/OpenImageIO/imageio.h"
 }
-
 libclang_there() {
     local directory file
-    for directory in ${LIBCLANG_PATH:+"$LIBCLANG_PATH"} /usr/lib/llvm-*/lib /usr/lib/*-linux-gnu /usr/lib64 \
-        /usr/lib /usr/local/lib; do
+    for directory in ${LIBCLANG_PATH:+"$LIBCLANG_PATH"} /usr/lib/llvm-*/lib /usr/lib/*-linux-gnu /usr/lib64 /usr/lib \
+        /usr/local/lib; do
         for file in "$directory"/libclang.so* "$directory"/libclang-[0-9]*.so*; do
             [ -e "$file" ] && echo "$file" && return
         done
     done
     return 1
 }
-
-missing=()
 found=()
 look() {
-    local file
+    local name file
     missing=() found=()
-    if file=$(embree_there); then found+=("$file"); else missing+=(embree); fi
-    if file=$(oiio_there); then found+=("$file"); else missing+=(oiio); fi
-    if file=$(libclang_there); then found+=("$file"); else missing+=(libclang); fi
+    for name in embree oiio libclang; do
+        if file=$("${name}_there"); then found+=("$file"); else missing+=("$name"); fi
+    done
 }
-lacks() { case " ${missing[*]} " in *" $1 "*) return 0 ;; *) return 1 ;; esac; }
+lacks() { [[ " ${missing[*]} " == *" $1 "* ]]; }
 
 # ---- The distribution's packages.
 
@@ -116,118 +131,68 @@ wanted_packages() {
 }
 install_packages() {
     say "installing with apt-get: $*"
-    as_root env DEBIAN_FRONTEND=noninteractive apt-get install -qq -y --no-install-recommends "$@" \
-        >"$scratch/apt.log" 2>&1 || { tail -n5 "$scratch/apt.log" >&2 && return 1; }
+    as_root env DEBIAN_FRONTEND=noninteractive apt-get install -qq -y --no-install-recommends "$@" >"$scratch/log" 2>&1
 }
 
-# ---- The private prefix.
+# ---- What the private prefix is made from, in $scratch/{wheels,source,headers}.
 
 # apt-get on sources of our own choice; neither the system's package lists nor its packages change.
 private_apt() { # sources file, arguments
-    local sources=$1 state=$scratch/apt-$(basename "$1")
-    shift
+    local state=$1.apt options=()
     mkdir -p "$state/lists/partial" "$state/cache/archives/partial"
-    local user=()
-    [ "$(id -u)" = 0 ] && user=(-o APT::Sandbox::User=root)
+    [ "$(id -u)" != 0 ] || options=(-o APT::Sandbox::User=root)
     apt-get -qq -o Dir::State="$state" -o Dir::State::status=/var/lib/dpkg/status -o Dir::Cache="$state/cache" \
-        -o Dir::Etc::sourcelist="$sources" -o Dir::Etc::sourceparts=/nonexistent -o Acquire::Languages=none \
+        -o Dir::Etc::sourcelist="$1" -o Dir::Etc::sourceparts=/dev/null -o Acquire::Languages=none \
         -o Acquire::IndexTargets::deb::DEP-11::DefaultEnabled=false -o Debug::NoLocking=true \
-        "${user[@]}" "$@" >>"$scratch/apt.log" 2>&1
+        "${options[@]}" "${@:2}" >>"$scratch/log" 2>&1
 }
-
-# The addresses of the archives that this machine's apt is set up with and that carry its release.
+# Addresses and suites of the archives from which this machine's apt takes its release.
 own_archives() {
+    local release
+    release=$(. /etc/os-release && echo "${VERSION_CODENAME:-sid}")
     apt-get update --print-uris 2>/dev/null |
-        sed -n "s,^'\(.*\)/dists/\($1\|stable\|oldstable\|testing\|unstable\|sid\)/InRelease'.*,\1 \2,p" | sort -u
+        sed -n "s,^'\(.*\)/dists/\($release\|stable\|oldstable\|testing\|unstable\|sid\)/InRelease'.*,\1 \2,p" | sort -u
 }
 
-# Headers out of Debian's packages, whatever Debian the machine runs.
-debian_headers() { # directory, packages
-    local directory=$1 codename archive package ok
-    shift
-    codename=$(. /etc/os-release && echo "${VERSION_CODENAME:-sid}")
-    local keyring=/usr/share/keyrings/debian-archive-keyring.gpg
-    [ -r "$keyring" ] || { echo "Debian's archive keyring ($keyring) is not there" >&2 && return 1; }
-    mkdir -p "$scratch/debs"
-    while read -r archive _; do
-        echo "deb [arch=amd64 signed-by=$keyring] $archive $header_suite main" >"$scratch/headers.list"
-        ok=1
-        private_apt "$scratch/headers.list" update || ok=
-        for package in "$@"; do
-            [ -n "$ok" ] && (cd "$scratch/debs" && private_apt "$scratch/headers.list" download "$package") || ok=
-        done
-        [ -n "$ok" ] && break
-    done < <(own_archives "$codename")
-    [ -n "${ok-}" ] || { echo "no package archive of this machine has $* of Debian $header_suite" >&2 && return 1; }
-    for package in "$@"; do
-        echo "${header_sha256[$package]}  $(echo "$scratch/debs/$package"_*.deb)" | sha256sum --check --quiet >&2 || return 1
-        dpkg-deb -x "$scratch/debs/$package"_*.deb "$directory"
-    done
-}
-
-# Python with pip: the machine's, else the distribution's packages, unpacked into the scratch directory.
-pip=()
+# Python with pip: the machine's, else from the distribution's packages, installed or only unpacked into $scratch.
+python='' pip=()
 find_pip() {
-    if python3 -m pip --version >/dev/null 2>&1; then
-        pip=(python3 -m pip)
-    elif may_install && install_packages python3-pip; then
-        pip=(python3 -m pip)
-    else
-        local sources=$scratch/tools.list tools=$scratch/tools codename archive suite deb
-        codename=$(. /etc/os-release && echo "${VERSION_CODENAME:-sid}")
-        own_archives "$codename" | while read -r archive suite; do echo "deb $archive $suite main"; done >"$sources"
-        private_apt "$sources" update
-        private_apt "$sources" install -y --download-only --no-install-recommends python3-minimal libpython3-stdlib \
-            python3-pip-whl || return 1
-        mkdir -p "$tools"
-        for deb in "$scratch/apt-tools.list/cache/archives/"*.deb; do
-            case $(basename "$deb") in libc6_* | libc-bin_*) continue ;; esac
-            dpkg-deb -x "$deb" "$tools"
-        done
-        local python=python3
-        if ! command -v python3 >/dev/null; then
-            python=$(echo "$tools"/usr/bin/python3.*[0-9])
-            export PYTHONHOME=$tools/usr
-            LD_LIBRARY_PATH=$(echo "$tools"/usr/lib/*-linux-gnu):$(echo "$tools"/lib/*-linux-gnu)
-            export LD_LIBRARY_PATH
-        fi
-        pip=("$python" "$(echo "$tools"/usr/share/python-wheels/pip-*.whl)/pip")
-        "${pip[@]}" --version >/dev/null
+    python=python3 pip=(python3 -m pip)
+    "${pip[@]}" --version >/dev/null 2>&1 && return
+    if may_install && install_packages python3-pip; then return; fi
+    local sources=$scratch/tools.list tools=$scratch/tools archive suite package
+    own_archives | while read -r archive suite; do echo "deb $archive $suite main"; done >"$sources"
+    private_apt "$sources" update
+    private_apt "$sources" install -y --download-only --no-install-recommends python3-minimal libpython3-stdlib \
+        python3-pip-whl ca-certificates || return 1
+    mkdir -p "$tools"
+    for package in "$sources.apt/cache/archives/"*.deb; do
+        # A C library of another version than the running one would break every program.
+        [[ $(basename "$package") == libc6_* ]] || dpkg-deb -x "$package" "$tools"
+    done
+    if ! command -v python3 >/dev/null; then
+        python=$(echo "$tools"/usr/bin/python3.*[0-9])
+        export PYTHONHOME=$tools/usr
+        LD_LIBRARY_PATH=$(echo "$tools"/usr/lib/*-linux-gnu):$(echo "$tools"/lib/*-linux-gnu)
+        export LD_LIBRARY_PATH
     fi
+    # A wheel is a program, too.
+    pip=("$python" "$(echo "$tools"/usr/share/python-wheels/pip-*.whl)/pip")
+    "${pip[@]}" --version >>"$scratch/log" 2>&1
 }
-unzip_wheel() { "${pip[0]}" -m zipfile -e "$1" "$2"; }
-fetch() { # directory, requirement lines, further arguments
-    local directory=$1 requirements=$2
-    shift 2
-    echo "$requirements" >"$scratch/requirements.txt"
+fetch() { # directory, requirements, further arguments
+    echo "$2" >"$scratch/requirements.txt"
     "${pip[@]}" download --quiet --disable-pip-version-check --no-cache-dir --no-deps --require-hashes \
-        --requirement "$scratch/requirements.txt" --dest "$directory" "$@" 2>"$scratch/pip.log" ||
-        { tail -n5 "$scratch/pip.log" >&2 && return 1; }
+        --requirement "$scratch/requirements.txt" --dest "$1" "${@:3}" >"$scratch/log" 2>&1
 }
 fetch_wheels() { # names; the tags make the choice independent of the Python at hand
-    local lines
-    lines=$(for name in "$@"; do echo "$wheels" | grep "^$name=="; done)
-    fetch "$scratch/wheels" "$lines" --only-binary=:all: --implementation cp --python-version 3.11 --abi cp311 \
-        --abi none --platform manylinux_2_28_x86_64 --platform manylinux2010_x86_64
-    for name in "$@"; do unzip_wheel "$scratch"/wheels/"$name"-*.whl "$scratch/unpacked"; done
+    local name lines
+    lines=$(for name in "$@"; do grep "^$name==" <<<"$wheels"; done)
+    fetch "$scratch/downloads" "$lines" --only-binary=:all: --implementation cp --python-version 3.11 --abi cp311 \
+        --abi none --platform manylinux_2_28_x86_64 --platform manylinux2010_x86_64 || return 1
+    for name in "$@"; do "$python" -m zipfile -e "$scratch/downloads/$name"-*.whl "$scratch/wheels"; done
 }
-
-private_embree() { # new prefix
-    fetch_wheels embreex
-    cp "$scratch"/unpacked/embreex.libs/*.so* "$1/lib/"
-    ln -s "$(basename "$1"/lib/libembree4-*.so.4)" "$1/lib/libembree4.so"
-    debian_headers "$scratch/headers" libembree-dev
-    cp -r "$scratch/headers/usr/include/embree4" "$1/include/"
-    echo 'EMBREE4_ROOT = { value = ".native", relative = true }' >>"$1/cargo.toml"
-}
-
-private_oiio() { # new prefix
-    fetch_wheels openimageio
-    local library version=${oiio_version[0]}.${oiio_version[1]}.${oiio_version[2]}
-    for library in libOpenImageIO libOpenImageIO_Util; do
-        cp "$scratch/unpacked/OpenImageIO/lib/$library.so.$version" "$1/lib/"
-        ln -s "$library.so.$version" "$1/lib/$library.so"
-    done
+fetch_oiio_source() {
     # pip asks a source archive's build backend for metadata even when it only downloads; this one answers without
     # building anything.
     mkdir -p "$scratch/backend/scikit_build_core"
@@ -240,84 +205,102 @@ def prepare_metadata_for_build_wheel(directory, settings=None):
     (info / "METADATA").write_text("Metadata-Version: 2.1\nName: openimageio\nVersion: $(IFS=. && echo "${oiio_version[*]}")\n")
     return info.name
 END
-    PYTHONPATH=$scratch/backend fetch "$scratch/source" "$oiio_source" --no-binary=:all: --no-build-isolation
-    tar -xzf "$scratch"/source/openimageio-*.tar.gz -C "$scratch" --strip-components=1 --wildcards '*/src/include/OpenImageIO'
-    local headers=$1/include/OpenImageIO
-    cp -r "$scratch/src/include/OpenImageIO" "$headers"
+    PYTHONPATH=$scratch/backend \
+        fetch "$scratch/downloads" "$oiio_source" --no-binary=:all: --no-build-isolation || return 1
+    mkdir -p "$scratch/source"
+    tar -xzf "$scratch"/downloads/openimageio-*.tar.gz -C "$scratch/source" --strip-components=1
+}
+# Headers out of Debian's packages, whatever Debian the machine runs.
+fetch_headers() { # packages
+    local keyring=/usr/share/keyrings/debian-archive-keyring.gpg sources=$scratch/headers.list archive sum package
+    [ -r "$keyring" ] || { echo "Debian's archive keyring is not there: $keyring" >"$scratch/log" && return 1; }
+    mkdir -p "$scratch/headers"
+    while read -r archive _; do
+        echo "deb [arch=amd64 signed-by=$keyring] $archive $header_suite main" >"$sources"
+        private_apt "$sources" update && (cd "$scratch/headers" && private_apt "$sources" download "$@") && break
+    done < <(own_archives)
+    for package in "$@"; do
+        sum=$(sed -n "s/^$package //p" <<<"$header_sha256")
+        sha256sum --check --quiet <<<"$sum  $(echo "$scratch/headers/$package"_*.deb)" >>"$scratch/log" 2>&1 || return 1
+        dpkg-deb -x "$scratch/headers/$package"_*.deb "$scratch/headers"
+    done
+}
+
+# ---- The private prefix, in $new.
+
+new=$prefix/new
+place_embree() {
+    cp "$scratch"/wheels/embreex.libs/*.so* "$new/lib/"
+    ln -s "$(cd "$new/lib" && echo libembree4-*.so.4)" "$new/lib/libembree4.so"
+    cp -rp "$scratch/headers/usr/include/embree4" "$new/include/"
+    echo 'EMBREE4_ROOT = { value = ".native", relative = true }' >>"$new/cargo.toml"
+}
+place_oiio() {
+    local library version=${oiio_version[0]}.${oiio_version[1]}.${oiio_version[2]} include=$new/include/OpenImageIO
+    for library in libOpenImageIO libOpenImageIO_Util; do
+        cp "$scratch/wheels/OpenImageIO/lib/$library.so.$version" "$new/lib/"
+        ln -s "$library.so.$version" "$new/lib/$library.so"
+    done
+    cp -rp "$scratch/source/src/include/OpenImageIO" "$include"
     sed -e "s/@PROJECT_VERSION_MAJOR@/${oiio_version[0]}/; s/@PROJECT_VERSION_MINOR@/${oiio_version[1]}/" \
         -e "s/@PROJECT_VERSION_PATCH@/${oiio_version[2]}/; s/@PROJECT_VERSION_TWEAK@/${oiio_version[3]}/" \
         -e "s/@PROJECT_VERSION_RELEASE_TYPE@//; s/@PROJ_NAMESPACE@/OpenImageIO/g" \
         -e "s/@PROJ_VERSION_NAMESPACE@/v${oiio_version[0]}_${oiio_version[1]}/g" \
         -e "s/@Imath_VERSION_MAJOR@/3/; s/@Imath_VERSION_MINOR@/1/; s/@CMAKE_CXX_STANDARD@/17/g" \
-        -e "s/^#cmakedefine01 OIIO_TBB/#define OIIO_TBB 0/" "$headers/oiioversion.h.in" >"$headers/oiioversion.h"
-    ! grep -n '@\|cmakedefine' "$headers/oiioversion.h" >&2
-    debian_headers "$scratch/headers" libimath-dev libfmt-dev
-    cp -r "$scratch/headers/usr/include/Imath" "$1/include/"
-    cp -r "$scratch/headers/usr/include/fmt" "$headers/detail/"
-    echo 'OIIO_ROOT = { value = ".native", relative = true }' >>"$1/cargo.toml"
+        -e "s/^#cmakedefine01 OIIO_TBB/#define OIIO_TBB 0/" "$include/oiioversion.h.in" >"$include/oiioversion.h"
+    ! grep '@\|cmakedefine' "$include/oiioversion.h" >"$scratch/log"
+    touch -r "$include/oiioversion.h.in" "$include/oiioversion.h"
+    cp -rp "$scratch/headers/usr/include/Imath" "$new/include/"
+    cp -rp "$scratch/headers/usr/include/fmt" "$include/detail/"
+    echo 'OIIO_ROOT = { value = ".native", relative = true }' >>"$new/cargo.toml"
 }
-
-private_libclang() { # new prefix
-    fetch_wheels libclang
-    cp "$scratch"/unpacked/libclang-*.data/platlib/clang/native/libclang.so "$1/lib/"
-    echo 'LIBCLANG_PATH = { value = ".native/lib", relative = true }' >>"$1/cargo.toml"
+place_libclang() {
+    cp "$scratch"/wheels/libclang-*.data/platlib/clang/native/libclang.so "$new/lib/"
+    echo 'LIBCLANG_PATH = { value = ".native/lib", relative = true }' >>"$new/cargo.toml"
 }
-
-give_up() {
-    local name
-    {
-        echo "setup: could not bring: ${missing[*]}"
-        [ $# = 0 ] || echo "setup: $*"
-        [ -s "$scratch/apt.log" ] && grep -h '^[EW]:' "$scratch/apt.log" | sort -u | head -n5
-        for name in "${missing[@]}"; do
-            case $name in
-            embree) echo "  Embree >= 4.3: libembree-dev (Debian >= 13, Ubuntu >= 24.04), or set EMBREE4_ROOT to one" ;;
-            oiio) echo "  OpenImageIO >= 3.1.4: where pkg-config finds it, or set OIIO_ROOT to one" ;;
-            libclang) echo "  libclang: libclang-dev, or set LIBCLANG_PATH to its directory" ;;
-            esac
-        done
-        echo "  Without any of these: cargo build --no-default-features  (docs/setup.md)"
-    } >&2
-    exit 1
+make_prefix() {
+    local names=() headers=() name
+    if lacks embree; then names+=(embreex) && headers+=(libembree-dev); fi
+    if lacks oiio; then names+=(openimageio) && headers+=(libimath-dev libfmt-dev); fi
+    if lacks libclang; then names+=(libclang); fi
+    say "putting a private copy into $prefix: ${missing[*]}"
+    [ "$(uname -sm)" = "Linux x86_64" ] || give_up "the private copies are for Linux on x86_64"
+    command -v apt-get >/dev/null && command -v dpkg-deb >/dev/null ||
+        give_up "the private copies are made of Debian's and Python's packages: apt-get and dpkg-deb are needed"
+    find_pip || give_up "Python with pip is needed: package python3-pip"
+    fetch_wheels "${names[@]}" || give_up "pip could not download ${names[*]}"
+    lacks oiio && { fetch_oiio_source || give_up "pip could not download OpenImageIO's headers"; }
+    [ ${#headers[@]} = 0 ] || fetch_headers "${headers[@]}" ||
+        give_up "apt-get could not download ${headers[*]} of Debian $header_suite"
+    rm -rf "$new"
+    mkdir -p "$new/include" "$new/lib"
+    echo "[env]" >"$new/cargo.toml"
+    for name in "${missing[@]}"; do "place_$name"; done
 }
 
 # ---- The way through.
 
-command -v "${CXX:-c++}" >/dev/null || { echo "setup: a C++ compiler is needed (c++, or CXX)" >&2 && exit 1; }
 look
 if [ ${#missing[@]} -gt 0 ] && command -v apt-get >/dev/null; then
     if may_install; then
         # A fresh container has no package lists yet.
-        offers libc6 0 || as_root apt-get update -qq >"$scratch/apt.log" 2>&1 || true
-        mapfile -t packages < <(wanted_packages | tr ' ' '\n')
-        if [ ${#packages[@]} -gt 0 ] && install_packages "${packages[@]}"; then look; fi
+        offers libc6 0 || as_root apt-get update -qq >"$scratch/log" 2>&1 || true
+        read -r -a packages < <(wanted_packages | tr '\n' ' ') || true
+        if [ ${#packages[@]} -gt 0 ]; then
+            install_packages "${packages[@]}" || say "apt-get could not"
+            look
+        fi
     elif [ -z "$private" ]; then
         packages=$(wanted_packages | tr '\n' ' ')
-        [ -z "$packages" ] || say "not root, so a private copy instead of the distribution's $packages"
+        [ -z "$packages" ] || say "(with root's rights, these packages would be used: $packages)"
     fi
 fi
-
-rm -f "$stamp"
-new=$prefix/new
-rm -rf "$new" "$prefix/include" "$prefix/lib" "$prefix/cargo.toml"
-if [ ${#missing[@]} -gt 0 ]; then
-    say "putting a private copy of ${missing[*]} into $prefix"
-    [ "$(uname -sm)" = "Linux x86_64" ] || give_up "the private copies are for Linux on x86_64"
-    command -v apt-get >/dev/null && command -v dpkg-deb >/dev/null || give_up "the private copies need Debian's apt and dpkg"
-    find_pip || give_up "Python with pip is needed: python3-pip"
-    mkdir -p "$new/include" "$new/lib"
-    echo "[env]" >"$new/cargo.toml"
-    for name in "${missing[@]}"; do
-        # A subshell of its own: `set -e` is off inside a condition.
-        set +e
-        (set -e && "private_$name" "$new")
-        status=$?
-        set -e
-        [ $status = 0 ] || give_up
-    done
-    mv "$new"/* "$prefix/" && rmdir "$new"
-    found+=("$prefix/lib" "$prefix/include" "$prefix/cargo.toml")
-fi
 mkdir -p "$prefix"
+if [ ${#missing[@]} -gt 0 ]; then make_prefix; fi
+rm -rf "$prefix/include" "$prefix/lib" "$prefix/cargo.toml" "$stamp"
+if [ ${#missing[@]} -gt 0 ]; then
+    mv "$new"/* "$prefix/" && rmdir "$new"
+    found+=(lib include cargo.toml)
+fi
 { identity && printf '%s\n' "${found[@]}"; } >"$stamp"
 say "done"

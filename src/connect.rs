@@ -177,16 +177,14 @@ impl EyeVertex {
             return None;
         }
         let (cos, cos_light) = (vertex.cos_ng(edge.w), emitter.point.ng.dot(edge.w).abs());
-        let value = self.walk.throughput
-            * vertex.factor(vertex.wo, edge.w)
-            * radiance
-            * (cos * cos_light / edge.distance2);
+        let (factor, pdf_w) = vertex.toward_light(edge.w);
+        let value = self.walk.throughput * factor * radiance * (cos * cos_light / edge.distance2);
         if value == Spectrum::ZERO {
             return None;
         }
         let m = techniques.next_event;
         let hit = Side { a: 1.0 / emitter.pdf_a, b: 0.0 }.total(techniques.eye_hits, 0.0);
-        let l = per_area(vertex.pdf_w(vertex.wo, edge.w), cos_light, edge.distance2) * hit;
+        let l = per_area(pdf_w, cos_light, edge.distance2) * hit;
         let e = per_area(emitter.pdf_w(-edge.w), cos, edge.distance2) * self.total(edge.w);
         let value = value * (m / (emitter.pdf_a * (l + m + e)));
         Some((value, offset::between(&vertex.point, &emitter.point)))
@@ -205,15 +203,16 @@ impl EyeVertex {
         let (eye, y) = (&self.walk.vertex, &light.vertex);
         let edge = Edge::new(eye.point.position, y.point.position)?;
         let (cos, cos_light) = (eye.cos_ng(edge.w), y.cos_ng(edge.w));
+        let (factor, pdf_w) = eye.toward_light(edge.w);
         let value = self.walk.throughput
-            * eye.factor(eye.wo, edge.w)
+            * factor
             * y.factor(-edge.w, y.wo)
             * light.throughput
             * (cos * cos_light / edge.distance2);
         if value == Spectrum::ZERO || !(m > 0.0) {
             return None;
         }
-        let l = per_area(eye.pdf_w(eye.wo, edge.w), cos_light, edge.distance2)
+        let l = per_area(pdf_w, cos_light, edge.distance2)
             * light.side.total(techniques.before(light, -edge.w), y.pdf_w(-edge.w, y.wo));
         let e = per_area(y.pdf_w(y.wo, -edge.w), cos, edge.distance2) * self.total(edge.w);
         let value = value * (m / (tries * (l + m + e)));

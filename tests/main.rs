@@ -6,10 +6,13 @@ mod roulette;
 mod support;
 
 mod bsdf;
+mod light;
 mod warps;
 mod image;
 mod settings;
 mod cli;
 mod agreement;
+mod ray_offset;
+mod visibility;
 mod determinism;
 mod mis;

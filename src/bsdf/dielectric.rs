@@ -23,7 +23,8 @@ struct Facet {
     d: f64,
     /// How much of the light it sends that way: F or 1 - F.
     share: f64,
-    /// 4 |cos(wo, m)| dm/dwi / n_i^2, the factor that `f` and `pdf` share; the same with both directions exchanged.
+    /// 4 |cos(wo, m)| dm/dwi, over n_i^2 for refraction: the factor that `f` and `pdf` share, and the same with both
+    /// directions exchanged.
     spread: f64,
 }
 

@@ -57,7 +57,7 @@ impl Ggx {
         2.0 * z / (z + self.stretched_length(w))
     }
 
-    /// Height-correlated masking and shadowing over both cosines, `G2 / (4 |a.z| |b.z|)` [Heitz 2014, eq. 99]. It
+    /// Height-correlated masking and shadowing over both cosines, `G2 / (4 |a.z| |b.z|)` [Heitz 2014]. It
     /// grows without bound where both graze; directions nearer to the horizon than 1e-200 keep it finite.
     pub fn g2_over_4_cosines(&self, a: DVec3, b: DVec3) -> f64 {
         let cosines = self.stretched_length(a) * b.z.abs() + self.stretched_length(b) * a.z.abs();

@@ -19,7 +19,8 @@ pub struct SurfacePoint {
     pub barycentric: DVec2,
     /// Triangle index.
     pub triangle: u32,
-    /// How far the position and a ray tracer's idea of the triangle may lie apart, world units.
+    /// What a unit in the last place of an `f32` is worth here, world units: of the coordinates relative to the mesh's
+    /// origin, or of the triangle's extent where that is larger. Rays start off the surface by a little more.
     pub error: f64,
 }
 
@@ -37,10 +38,10 @@ impl SurfacePoint {
         let corners = mesh.corners(triangle);
         let [e1, e2] = [corners[1] - corners[0], corners[2] - corners[0]];
         let p = direction.cross(e2);
-        let det = e1.dot(p);
+        let inverse = 1.0 / e1.dot(p);
         let s = origin - corners[0];
         let q = s.cross(e1);
-        let (u2, v2, t) = (s.dot(p) / det, direction.dot(q) / det, e2.dot(q) / det);
+        let (u2, v2, t) = (s.dot(p) * inverse, direction.dot(q) * inverse, e2.dot(q) * inverse);
         // Both answers describe the same hit unless the ray grazes the plane.
         if (u2 - u).abs() + (v2 - v).abs() < 1e-3 {
             Self::new(mesh, triangle, corners, origin + direction * t, u2, v2)
@@ -74,8 +75,14 @@ impl SurfacePoint {
             let uv = t[0] * weights[0] + t[1] * weights[1] + t[2] * weights[2];
             (uv, if det == 0.0 { Frame::from_z(ns) } else { Frame::from_z_tangent(ns, tangent) })
         };
-        let extent = e1.abs().max(e2.abs()).max_element().max(position.abs().max_element());
         let barycentric = DVec2::new(u, v);
-        Self { position, ng, frame, uv, barycentric, triangle, error: extent * f64::from(f32::EPSILON) }
+        Self { position, ng, frame, uv, barycentric, triangle, error: Self::error_on(&corners) }
+    }
+
+    /// [`SurfacePoint::error`] for all points of a triangle.
+    pub fn error_on(&[a, b, c]: &[DVec3; 3]) -> f64 {
+        let coordinates = a.abs().max(b.abs()).max(c.abs());
+        let extent = (b - a).abs().max((c - a).abs());
+        coordinates.max(extent).max_element() * f64::from(f32::EPSILON)
     }
 }

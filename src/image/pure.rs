@@ -7,7 +7,7 @@ use exr::prelude::{
 };
 use glam::Vec3;
 use std::fs::File;
-use std::io::{BufRead, BufReader, Cursor, Read, Seek};
+use std::io::{BufRead, BufReader, Cursor, Seek};
 use std::path::Path;
 
 /// An EXR file: channels R, G, B as 32-bit floats, ZIP-compressed. The error is a sentence.
@@ -126,7 +126,7 @@ fn decode_exr(mut file: impl BufRead + Seek) -> Result<Decoded, String> {
     })
 }
 
-fn decode_png(file: impl BufRead + Seek + Read) -> Result<Decoded, String> {
+fn decode_png(file: impl BufRead + Seek) -> Result<Decoded, String> {
     let mut decoder = png::Decoder::new(file);
     decoder.set_transformations(png::Transformations::EXPAND);
     let mut reader = decoder.read_info().map_err(|e| e.to_string())?;

@@ -76,18 +76,15 @@ impl<'a> PathTracer<'a> {
             return Spectrum::ZERO;
         }
         let wi = to / distance2.sqrt();
-        let value = vertex.factor(vertex.wo, wi) * vertex.cos_ng(wi) * emitter.radiance(-wi);
+        let (factor, pdf_w) = vertex.toward_light(wi);
+        let value = factor * vertex.cos_ng(wi) * emitter.radiance(-wi);
         if value == Spectrum::ZERO {
             return value;
         }
         let pdf_light = emitter.pdf_a * distance2 / emitter.point.ng.dot(wi).abs();
         let ray = offset::between(&vertex.point, &emitter.point);
         let free = clock.time(&mut tally.visibility, || !self.world.visibility.occluded(&ray));
-        if tally.connection(free) {
-            value / (pdf_light + vertex.pdf_w(vertex.wo, wi))
-        } else {
-            Spectrum::ZERO
-        }
+        if tally.connection(free) { value / (pdf_light + pdf_w) } else { Spectrum::ZERO }
     }
 }
 

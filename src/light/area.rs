@@ -21,7 +21,8 @@ pub struct Lights {
 struct Emitter {
     triangle: u32,
     corners: [DVec3; 3],
-    ng: DVec3,
+    frame: Frame,
+    error: f64,
     emission: Spectrum,
     two_sided: bool,
     /// Density of points over this triangle, pick included, 1/m^2.
@@ -49,7 +50,7 @@ impl Lights {
         let mut of_triangle = Vec::new();
         for triangle in 0..mesh.triangles.len() as u32 {
             let material = &materials[mesh.materials[triangle as usize] as usize];
-            let area = mesh.area(triangle);
+            let (area, corners) = (mesh.area(triangle), mesh.corners(triangle));
             let sides = if material.two_sided_emission { 2.0 } else { 1.0 };
             let power = PI * sides * area * luminance(material.emission);
             if !(power > 0.0) {
@@ -62,8 +63,9 @@ impl Lights {
             weights.push(power);
             emitters.push(Emitter {
                 triangle,
-                corners: mesh.corners(triangle),
-                ng: mesh.scaled_normal(triangle).normalize(),
+                corners,
+                frame: Frame::from_z(mesh.scaled_normal(triangle).normalize()),
+                error: SurfacePoint::error_on(&corners),
                 emission: material.emission,
                 two_sided: material.two_sided_emission,
                 pdf_a: 1.0 / area,
@@ -95,15 +97,14 @@ impl Lights {
         let uv = warp::square_to_triangle(u);
         let [a, b, c] = emitter.corners;
         let position = a * (1.0 - uv.x - uv.y) + b * uv.x + c * uv.y;
-        let extent = (b - a).abs().max((c - a).abs()).max(position.abs()).max_element();
         let point = SurfacePoint {
             position,
-            ng: emitter.ng,
-            frame: Frame::from_z(emitter.ng),
+            ng: emitter.frame.z,
+            frame: emitter.frame,
             uv,
             barycentric: uv,
             triangle: emitter.triangle,
-            error: extent * f64::from(f32::EPSILON),
+            error: emitter.error,
         };
         Some(emitter.at(point))
     }

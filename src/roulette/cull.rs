@@ -9,12 +9,17 @@ use fearless_simd::{Level, Simd, dispatch, f32x8, prelude::*};
 /// Lobes of a query that take part in culling; with more, every vertex is tested.
 pub const MAX_LOBES: usize = 8;
 
-/// A depth-first walk keeps at most seven siblings waiting on each level and the last node's children; stores write
-/// eight entries at a time.
-const STACK: usize = MAX_LEVELS * WIDTH + WIDTH;
+/// Nodes of one level that are taken up together. They are independent work for the processor, which a chain of
+/// single visits, each as long as its latencies, is not.
+const CHUNK: usize = 4;
+
+/// A chunk's children are done before its siblings, so each level has at most those waiting; stores write eight
+/// entries at a time.
+const STACK: usize = MAX_LEVELS * CHUNK * WIDTH + WIDTH;
 
 /// Visits every accepted light vertex: its index into the positions given to [`VertexBvh::build`], and its
-/// probability P. The set, the probabilities and their order are the same on every machine and thread.
+/// probability P. The set, the probabilities and their order (tree order, from the last block to the first) are the
+/// same on every machine.
 pub fn query(
     bvh: &VertexBvh,
     query: &Query<'_>,
@@ -46,7 +51,10 @@ fn start(
     if !(query.constant > 0.0) {
         return;
     }
-    let mut walk = Walk { bvh, query, lobes: [FlatLobe::NONE; MAX_LOBES], count: 0, cull, stats, visit };
+    let high = query.position.as_vec3();
+    let low = (query.position - high.as_dvec3()).as_vec3().to_array();
+    let (high, lobes) = (high.to_array(), [FlatLobe::NONE; MAX_LOBES]);
+    let mut walk = Walk { bvh, query, high, low, lobes, count: 0, cull, stats, visit };
     for lobe in query.lobes.iter().filter_map(|l| FlatLobe::new(l, query.constant)) {
         if walk.count == MAX_LOBES {
             walk.cull = false;
@@ -68,6 +76,9 @@ fn start(
 struct Walk<'a> {
     bvh: &'a VertexBvh,
     query: &'a Query<'a>,
+    /// The query's position in two f32 parts.
+    high: [f32; 3],
+    low: [f32; 3],
     lobes: [FlatLobe; MAX_LOBES],
     count: usize,
     cull: bool,
@@ -78,42 +89,79 @@ struct Walk<'a> {
 impl Walk<'_> {
     #[inline(always)]
     fn run<S: Simd, D: Deal>(&mut self, simd: S, root: NodeId, deal: D) {
-        let high = self.query.position.as_vec3();
-        let low = (self.query.position - high.as_dvec3()).as_vec3();
-        let (high, low) = (high.to_array(), low.to_array());
-        let mut nodes = [0; STACK];
-        let mut numbers = [deal.root(VertexBvh::capacity(root.level)); STACK];
-        nodes[0] = root.pack();
-        let mut top = 1;
-        while top > 0 {
-            top -= 1;
-            let node = NodeId::unpack(nodes[top]);
-            let dealt = deal.eight(simd, numbers[top], node);
-            let mut live = (1u32 << self.bvh.children(node)) - 1;
-            if let Some(masks) = self.bvh.masks(node) {
-                live &= shared(masks, self.query.mask);
-            }
-            self.stats.nodes += 1;
-            self.stats.tests += u64::from(live.count_ones());
-            if node.level == 0 {
-                let points = &self.bvh.blocks()[node.index as usize];
-                if self.cull {
-                    let at = Box8::around_points(Vec8::relative(simd, &points.position, high, low));
-                    live &= self.touched::<S, true>(D::bounds(simd, &dealt), at);
+        let number = deal.root(VertexBvh::capacity(root.level));
+        let (mut nodes, mut numbers) = ([root.index; STACK], [number; STACK]);
+        // Nodes of the current level wait at `first[level]..top`, those of higher levels below.
+        let mut first = [0; MAX_LEVELS];
+        let (mut level, mut top) = (root.level as usize, 1);
+        loop {
+            let count = (top - first[level]).min(CHUNK);
+            if count == 0 {
+                if level == root.level as usize {
+                    return;
                 }
-                self.block(node, live, deal, &dealt);
+                level += 1;
                 continue;
             }
-            if self.cull {
-                let boxes = self.bvh.boxes(node);
-                let center = Vec8::relative(simd, &boxes.center, high, low);
-                let boxes = Box8::new(simd, center, &boxes.half);
-                live &= self.touched::<S, false>(D::bounds(simd, &dealt), boxes);
+            top -= count;
+            let mut chunk = [(0, number); CHUNK];
+            for i in 0..count {
+                chunk[i] = (nodes[top + i], numbers[top + i]);
             }
-            push(simd, &mut nodes[top..top + WIDTH], node.child(0).pack(), live);
-            D::push(simd, &mut numbers[top..top + WIDTH], &dealt, live);
-            top += live.count_ones() as usize;
+            let at = |index| NodeId { level: level as u32, index };
+            if level == 0 {
+                // From the top of the stack: in falling order throughout, whatever was culled.
+                for &(index, number) in chunk[..count].iter().rev() {
+                    let dealt = deal.eight(simd, number, at(index));
+                    let live = self.visit_block(simd, at(index), D::bounds(simd, &dealt));
+                    self.decide(at(index), live, deal, &dealt);
+                }
+                continue;
+            }
+            first[level - 1] = top;
+            for &(index, number) in &chunk[..count] {
+                let dealt = deal.eight(simd, number, at(index));
+                let live = self.visit_node(simd, at(index), D::bounds(simd, &dealt));
+                push(simd, &mut nodes[top..top + WIDTH], index * WIDTH as u32, live);
+                D::push(simd, &mut numbers[top..top + WIDTH], &dealt, live);
+                top += live.count_ones() as usize;
+            }
+            level -= 1;
         }
+    }
+
+    /// The children of an inner node that the range may touch.
+    #[inline(always)]
+    fn visit_node<S: Simd>(&mut self, simd: S, node: NodeId, numbers: f32x8<S>) -> u32 {
+        let live = self.unmasked(node);
+        if !self.cull {
+            return live;
+        }
+        let boxes = self.bvh.boxes(node);
+        let center = Vec8::relative(simd, &boxes.center, self.high, self.low);
+        live & self.touched::<S, false>(numbers, Box8::new(simd, center, &boxes.half))
+    }
+
+    /// The vertices of a block that the range may touch.
+    #[inline(always)]
+    fn visit_block<S: Simd>(&mut self, simd: S, node: NodeId, numbers: f32x8<S>) -> u32 {
+        let live = self.unmasked(node);
+        if !self.cull {
+            return live;
+        }
+        let block = &self.bvh.blocks()[node.index as usize];
+        let points = Vec8::relative(simd, &block.position, self.high, self.low);
+        live & self.touched::<S, true>(numbers, Box8::around_points(points))
+    }
+
+    /// The children of a node that exist and that the query's mask lets through.
+    #[inline(always)]
+    fn unmasked(&mut self, node: NodeId) -> u32 {
+        let live = (1u32 << self.bvh.children(node)) - 1;
+        let live = live & self.bvh.masks(node).map_or(!0, |masks| shared(masks, self.query.mask));
+        self.stats.nodes += 1;
+        self.stats.tests += u64::from(live.count_ones());
+        live
     }
 
     /// The lanes whose boxes may hold a vertex with a probability above the numbers.
@@ -136,7 +184,7 @@ impl Walk<'_> {
 
     /// The decision proper, in f64, for the vertices of a block that may be near enough.
     #[inline(always)]
-    fn block<S: Simd, D: Deal>(&mut self, node: NodeId, mut live: u32, deal: D, dealt: &D::Eight<S>) {
+    fn decide<S: Simd, D: Deal>(&mut self, node: NodeId, mut live: u32, deal: D, dealt: &D::Eight<S>) {
         let block = &self.bvh.blocks()[node.index as usize];
         while live != 0 {
             let lane = live.trailing_zeros() as usize;

@@ -19,6 +19,18 @@ pub struct Lobe {
     weight: f64,
 }
 
+/// The shape of the range in which a lobe accepts light vertices.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Range {
+    /// As the lobe is.
+    #[default]
+    Ellipsoid,
+    /// Round about the axis, as wide as the lobe's wider side [Tokuyoshi & Harada 2017].
+    Spheroid,
+    /// The same in all directions: knows nothing of the lobe but its size [Tokuyoshi & Harada 2016].
+    Sphere,
+}
+
 /// Smallest roughness of a lobe; a GGX roughness of 1e-7 seen at a cosine of 1e-6 needs less than 1e-13.
 pub const MIN_ALPHA: f64 = 1e-14;
 
@@ -57,6 +69,17 @@ impl Lobe {
     /// The same lobe with another weight.
     pub fn with_weight(self, weight: f64) -> Self {
         Self::new(self.frame, self.alpha_x, self.alpha_y, weight)
+    }
+
+    /// The same lobe with a simpler range around it: for comparison with the ellipsoid, which needs fewer vertices for
+    /// the same image.
+    pub fn with_range(self, range: Range) -> Self {
+        let widest = self.alpha_x.max(self.alpha_y);
+        match range {
+            Range::Ellipsoid => self,
+            Range::Spheroid => Self::new(self.frame, widest, widest, self.weight),
+            Range::Sphere => Self::new(self.frame, 1.0, 1.0, self.weight),
+        }
     }
 
     /// K in a direction (unit or not), in (0,1]; 1 on the axis. Without the weight.

@@ -18,7 +18,7 @@ pub mod min_random;
 mod plane;
 
 pub use cull::{MAX_LOBES, query, query_brute_force};
-pub use lobe::Lobe;
+pub use lobe::{Lobe, Range};
 pub use min_random::MinimumRandom;
 
 use glam::DVec3;

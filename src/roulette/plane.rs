@@ -3,14 +3,18 @@
 
 use super::lobe::Lobe;
 use fearless_simd::{Simd, f32x8, prelude::*};
+use glam::Vec3;
 
 /// A lobe as the box test sees it: f32, and scaled so that `h(x) <= 1 / sqrt(xi)` is the roulette's condition.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct FlatLobe {
     /// World to lobe space: the frame's rows over (alpha_x, alpha_y, 1) sqrt(C c).
     rows: [[f32; 3]; 3],
-    /// Lobe axis in world space; unit, shortened as the lobe becomes a sphere and the axis loses its meaning.
-    axis: [f32; 3],
+    /// How far along world axis i a displacement along j must be made good to stay as near to the lobe's axis as
+    /// can be: the first two rows' Gram matrix, each line over its diagonal.
+    follow: [[f32; 3]; 3],
+    /// 1 / support function of the ellipsoid h = 1 along x, y, z and -x, -y, -z.
+    inv_support: [[f32; 3]; 2],
     /// The thin axis of a lobe that is much flatter one way than the other.
     thin: Option<[f32; 3]>,
     a2: f32,
@@ -25,7 +29,14 @@ const THIN: f64 = 3.0;
 
 impl FlatLobe {
     /// What stands in for no lobe.
-    pub const NONE: Self = Self { rows: [[0.0; 3]; 3], axis: [0.0; 3], thin: None, a2: 1.0, inv_a2: 1.0 };
+    pub const NONE: Self = Self {
+        rows: [[0.0; 3]; 3],
+        follow: [[0.0; 3]; 3],
+        inv_support: [[0.0; 3]; 2],
+        thin: None,
+        a2: 1.0,
+        inv_a2: 1.0,
+    };
 
     /// `None` for a lobe that accepts nothing.
     pub fn new(lobe: &Lobe, constant: f64) -> Option<Self> {
@@ -34,19 +45,37 @@ impl FlatLobe {
             return None;
         }
         let scale = 1.0 / power.sqrt();
-        let (f, (ax, ay)) = (lobe.frame(), lobe.alpha());
+        let (frame, (ax, ay)) = (lobe.frame(), lobe.alpha());
         let a2 = ax.max(ay) * ax.max(ay);
+        let (x, y, z) = (frame.x.as_vec3(), frame.y.as_vec3(), frame.z.as_vec3());
+        let (x_row, y_row, z_row) = (x * (scale / ax) as f32, y * (scale / ay) as f32, z * scale as f32);
         let thin = match () {
-            _ if ay > THIN * ax => Some(f.x.as_vec3().to_array()),
-            _ if ax > THIN * ay => Some(f.y.as_vec3().to_array()),
+            _ if ay > THIN * ax => Some(x.to_array()),
+            _ if ax > THIN * ay => Some(y.to_array()),
             _ => None,
         };
+        let (scale, ax, ay, a2) = (scale as f32, ax as f32, ay as f32, a2 as f32);
+
+        // A world axis along the lobe's brings nothing nearer: the bound only shortens the step there.
+        let length2 = (x_row * x_row + y_row * y_row).max(Vec3::splat(1e-12 * scale * scale));
+        let (x_step, y_step) = (x_row / length2, y_row / length2);
+        let follow = |i: usize| (x_step[i] * x_row + y_step[i] * y_row).to_array();
+
+        // The ellipsoid's centre and half width along the world axes; w - |m| without its cancellation.
+        let side2 = (x * ax) * (x * ax) + (y * ay) * (y * ay);
+        let m = 0.5 * (1.0 - a2) * z;
+        let half = 0.5 * (1.0 + a2) * z;
+        let far = (side2 + half * half).map(f32::sqrt) + m.abs();
+        let near = (side2 + a2 * z * z) / far;
+        let ahead = m.cmpgt(Vec3::ZERO);
+        let inv = |support: Vec3| (scale / support).to_array();
         Some(Self {
-            rows: [f.x * (scale / ax), f.y * (scale / ay), f.z * scale].map(|r| r.as_vec3().to_array()),
-            axis: (f.z * (1.0 - a2)).as_vec3().to_array(),
+            rows: [x_row.to_array(), y_row.to_array(), z_row.to_array()],
+            follow: [follow(0), follow(1), follow(2)],
+            inv_support: [inv(Vec3::select(ahead, far, near)), inv(Vec3::select(ahead, near, far))],
             thin,
-            a2: a2 as f32,
-            inv_a2: (1.0 / a2) as f32,
+            a2,
+            inv_a2: 1.0 / a2,
         })
     }
 }
@@ -90,11 +119,6 @@ impl<S: Simd> Vec8<S> {
     }
 
     #[inline(always)]
-    fn times(self, other: Self) -> Self {
-        Self { x: self.x * other.x, y: self.y * other.y, z: self.z * other.z }
-    }
-
-    #[inline(always)]
     fn abs(self) -> Self {
         Self { x: self.x.abs(), y: self.y.abs(), z: self.z.abs() }
     }
@@ -107,12 +131,6 @@ impl<S: Simd> Vec8<S> {
     #[inline(always)]
     fn add_to_each(self, v: f32x8<S>) -> Self {
         Self { x: self.x + v, y: self.y + v, z: self.z + v }
-    }
-
-    /// The point of the boxes nearest to a point, by components.
-    #[inline(always)]
-    fn clamp(self, lo: Self, hi: Self) -> Self {
-        Self { x: self.x.max(lo.x).min(hi.x), y: self.y.max(lo.y).min(hi.y), z: self.z.max(lo.z).min(hi.z) }
     }
 }
 
@@ -146,21 +164,53 @@ impl<S: Simd> Box8<S> {
         if POINTS {
             return positive(self.plane(lobe, c));
         }
-        let lo = Vec8 { x: c.x - e.x, y: c.y - e.y, z: c.z - e.z };
-        let hi = Vec8 { x: c.x + e.x, y: c.y + e.y, z: c.z + e.z };
-        let along = c.dot_row(lobe.axis).max(0.0);
-        let [ax, ay, az] = lobe.axis;
-        let on_axis = Vec8 { x: along * ax, y: along * ay, z: along * az };
-        let mut bound = positive(self.plane(lobe, c)).max(positive(self.plane(lobe, on_axis.clamp(lo, hi))));
+        let mut bound = self.faces(lobe).max(positive(self.plane(lobe, self.nearest_to_axis(lobe))));
         if let Some(thin) = lobe.thin {
             // The point nearest to the plane across the thin axis, in the box's own metric.
-            let slope = e.times(e);
-            let slope = Vec8 { x: slope.x * thin[0], y: slope.y * thin[1], z: slope.z * thin[2] };
-            let step = c.dot_row(thin) / slope.dot_row(thin);
-            let near = Vec8 { x: c.x - slope.x * step, y: c.y - slope.y * step, z: c.z - slope.z * step };
-            bound = bound.max(positive(self.plane(lobe, near.clamp(lo, hi))));
+            let (ex, ey, ez) = (e.x * e.x * thin[0], e.y * e.y * thin[1], e.z * e.z * thin[2]);
+            let step = c.dot_row(thin) / (Vec8 { x: ex, y: ey, z: ez }).dot_row(thin);
+            let near = Vec8 {
+                x: c.x - (ex * step).max(-e.x).min(e.x),
+                y: c.y - (ey * step).max(-e.y).min(e.y),
+                z: c.z - (ez * step).max(-e.z).min(e.z),
+            };
+            bound = bound.max(positive(self.plane(lobe, near)));
         }
         bound
+    }
+
+    /// Bounds from the planes of the boxes' faces: where the ellipsoid ends along the world axes.
+    #[inline(always)]
+    fn faces(self, lobe: &FlatLobe) -> f32x8<S> {
+        let (c, e) = (self.center, self.half);
+        let [plus, minus] = lobe.inv_support;
+        let x = ((c.x - e.x) * plus[0]).max((c.x + e.x) * -minus[0]);
+        let y = ((c.y - e.y) * plus[1]).max((c.y + e.y) * -minus[1]);
+        let z = ((c.z - e.z) * plus[2]).max((c.z + e.z) * -minus[2]);
+        x.max(y).max(z)
+    }
+
+    /// A point of each box near the lobe's axis, in the lobe's metric: coordinates descend in turn, twice.
+    #[inline(always)]
+    fn nearest_to_axis(self, lobe: &FlatLobe) -> Vec8<S> {
+        let (c, e) = (self.center, self.half);
+        let below = Vec8 { x: -e.x, y: -e.y, z: -e.z };
+        let [fx, fy, fz] = lobe.follow;
+        // u: how far the point is off its best place along each axis; d: its displacement from the centre.
+        let (ux, uy, uz) = (c.dot_row(fx), c.dot_row(fy), c.dot_row(fz));
+        let dx = (-ux).max(below.x).min(e.x);
+        let (uy, uz) = (dx.mul_add(fy[0], uy), dx.mul_add(fz[0], uz));
+        let dy = (-uy).max(below.y).min(e.y);
+        let (ux, uz) = (dy.mul_add(fx[1], dx + ux), dy.mul_add(fz[1], uz));
+        let dz = (-uz).max(below.z).min(e.z);
+        let (ux, uy) = (dz.mul_add(fx[2], ux), dz.mul_add(fy[2], dy + uy));
+        let x = (dx - ux).max(below.x).min(e.x);
+        let step = x - dx;
+        let (uy, uz) = (step.mul_add(fy[0], uy), step.mul_add(fz[0], dz + uz));
+        let y = (dy - uy).max(below.y).min(e.y);
+        let uz = (y - dy).mul_add(fz[1], uz);
+        let z = (dz - uz).max(below.z).min(e.z);
+        Vec8 { x: c.x + x, y: c.y + y, z: c.z + z }
     }
 
     /// The least value that the plane supporting `h` at `p` takes over the box.

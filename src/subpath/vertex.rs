@@ -70,6 +70,17 @@ impl Vertex {
         self.bsdf.eval(eye, light) * (light.z / cos)
     }
 
+    /// What an eye vertex does with light from the direction `wi`: [`Vertex::factor`] and [`Vertex::pdf_w`] for `wo`.
+    pub fn toward_light(&self, wi: DVec3) -> (Spectrum, f64) {
+        let light = self.frame.to_local(wi);
+        let pdf_w = self.bsdf.pdf(self.wo_local, light) * self.bsdf.survival();
+        let cos = self.point.ng.dot(wi);
+        if cos * light.z <= 0.0 || self.point.ng.dot(self.wo) * self.wo_local.z <= 0.0 {
+            return (Spectrum::ZERO, pdf_w);
+        }
+        (self.bsdf.eval(self.wo_local, light) * (light.z / cos), pdf_w)
+    }
+
     /// Density of going on to `to` when coming from `from`, survival included, 1/sr; without delta lobes.
     #[inline]
     pub fn pdf_w(&self, from: DVec3, to: DVec3) -> f64 {

@@ -1,6 +1,6 @@
-//! Building: sort along a space-filling curve, cut into blocks of eight, box upwards.
+//! Building: order the vertices, cut them into blocks of eight, box upwards.
 
-use super::morton::Grid;
+use super::kd::{self, Placed};
 use super::{Block, Boxes, MAX_LEVELS, MAX_VERTICES, VertexBvh, WIDTH};
 use crate::math::Aabb;
 use crate::{Error, Result};
@@ -10,7 +10,7 @@ use rayon::prelude::*;
 /// Buffers that a build needs and the next one reuses.
 #[derive(Debug, Default)]
 pub(super) struct Scratch {
-    keys: Vec<(u64, u32)>,
+    order: Vec<Placed>,
 }
 
 /// Vertices that one task handles at a time.
@@ -45,11 +45,14 @@ impl VertexBvh {
         if positions.is_empty() {
             return Ok(());
         }
-        let bounds = bounds(positions);
-        self.bounds = Some(bounds);
+        self.bounds = Some(bounds(positions));
         self.len = positions.len();
-        self.sort(positions, Grid::over(bounds));
-        self.fill_blocks(positions, masks);
+        let order = &mut self.scratch.order;
+        let place = |(index, &position): (usize, &Vec3)| Placed { position, index: index as u32 };
+        order.clear();
+        order.par_extend(positions.par_iter().enumerate().map(place));
+        kd::order(order);
+        self.fill_blocks(masks);
         self.fill_nodes();
         Ok(())
     }
@@ -64,25 +67,17 @@ impl VertexBvh {
         self.node_masks.clear();
     }
 
-    fn sort(&mut self, positions: &[Vec3], grid: Grid) {
-        let keys = &mut self.scratch.keys;
-        keys.clear();
-        keys.par_extend(positions.par_iter().enumerate().map(|(i, &p)| (grid.key(p), i as u32)));
-        keys.par_sort_unstable();
-    }
-
-    fn fill_blocks(&mut self, positions: &[Vec3], masks: Option<&[u32]>) {
-        let order = &self.scratch.keys;
+    fn fill_blocks(&mut self, masks: Option<&[u32]>) {
+        let order = &self.scratch.order;
         self.blocks.resize(self.len.div_ceil(WIDTH), Block::EMPTY);
         self.blocks.par_iter_mut().with_min_len(GRAIN / WIDTH).zip(order.par_chunks(WIDTH)).for_each(
             |(block, order)| {
                 *block = Block::EMPTY;
-                for (lane, &(_, index)) in order.iter().enumerate() {
-                    let p = positions[index as usize];
+                for (lane, vertex) in order.iter().enumerate() {
                     for axis in 0..3 {
-                        block.position[axis][lane] = p[axis];
+                        block.position[axis][lane] = vertex.position[axis];
                     }
-                    block.index[lane] = index;
+                    block.index[lane] = vertex.index;
                 }
             },
         );
@@ -90,8 +85,8 @@ impl VertexBvh {
         self.block_masks.resize(self.blocks.len(), [0; WIDTH]);
         self.block_masks.par_iter_mut().zip(order.par_chunks(WIDTH)).for_each(|(block, order)| {
             *block = [0; WIDTH];
-            for (lane, &(_, index)) in order.iter().enumerate() {
-                block[lane] = masks[index as usize];
+            for (lane, vertex) in order.iter().enumerate() {
+                block[lane] = masks[vertex.index as usize];
             }
         });
     }

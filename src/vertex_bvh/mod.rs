@@ -7,7 +7,7 @@
 //! boxes.
 
 mod build;
-mod morton;
+mod kd;
 
 use crate::math::Aabb;
 use glam::Vec3;

@@ -3,6 +3,9 @@
 //! Embree's `f32` arithmetic finds candidates; whether one lies within the ray's interval is decided in `f64`
 //! ([`confirm`]). So no ray is stopped by the surface that it leaves or ends at, however thin, distant or large
 //! Embree's own rounding makes that surface.
+//!
+//! Embree takes numbers below 1e-18 for 0 and drops triangles beyond 1.8e18. So it is given meshes of size 1 and
+//! directions of length 1, up to powers of two, which change no digit of any number.
 
 // One of the crate's two doors to C.
 #![allow(unsafe_code)]
@@ -15,12 +18,11 @@ use glam::Vec3;
 use std::ffi::{CString, c_void};
 use std::{mem, ptr};
 
-/// Embree silently leaves out triangles with coordinates beyond this.
-const LARGEST_COORDINATE: f32 = 1.8e18;
-
 /// A committed Embree scene of one triangle mesh.
 #[derive(Debug)]
 pub struct Embree {
+    /// Embree's coordinates per unit of the mesh's, a power of two.
+    scale: f32,
     // Released before the triangles that it refers to.
     scene: Scene,
     _triangles: Box<Triangles>,
@@ -38,13 +40,10 @@ impl Embree {
     /// Builds the acceleration structure with up to `threads` threads (0: all). The mesh is copied.
     pub fn new(mesh: &Mesh, threads: usize) -> Result<Self> {
         mesh.validate()?;
-        if let Some(i) = mesh.positions.iter().position(|p| p.abs().max_element() > LARGEST_COORDINATE) {
-            return Err(Error::Input(format!(
-                "vertex {i} is farther than {LARGEST_COORDINATE:e} from the mesh's middle"
-            )));
-        }
+        let scale =
+            inverse_power(mesh.positions.iter().fold(0.0, |size: f32, p| size.max(p.abs().max_element())));
         let mut positions = Vec::with_capacity(mesh.positions.len() + 1);
-        positions.extend_from_slice(&mesh.positions);
+        positions.extend(mesh.positions.iter().map(|&p| p * scale));
         positions.push(Vec3::ZERO);
         let triangles = Box::new(Triangles { positions, corners: mesh.triangles.clone() });
         let device = Device::new(threads)?;
@@ -59,8 +58,39 @@ impl Embree {
         unsafe { sys::rtcCommitScene(scene.0) };
         // A failed commit leaves an empty scene behind and says so nowhere else.
         device.check("building the acceleration structure")?;
-        Ok(Self { scene, _triangles: triangles })
+        Ok(Self { scale, scene, _triangles: triangles })
     }
+
+    /// A ray as Embree gets it, and what its distances are multiplied with to be the given one's.
+    #[inline]
+    fn scaled(&self, ray: &Ray) -> (sys::RTCRay, f32) {
+        let length = inverse_power(ray.direction.abs().max_element() * self.scale);
+        let (origin, direction) = (ray.origin * self.scale, ray.direction * self.scale * length);
+        let (t_min, t_max) = (ray.t_min / length, ray.t_max / length);
+        let raw = sys::RTCRay {
+            org_x: origin.x,
+            org_y: origin.y,
+            org_z: origin.z,
+            tnear: t_min,
+            dir_x: direction.x,
+            dir_y: direction.y,
+            dir_z: direction.z,
+            time: 0.0,
+            tfar: t_max,
+            mask: u32::MAX,
+            // Embree overwrites `tfar` with candidates; `confirm` needs the limit that was asked for.
+            id: t_max.to_bits(),
+            flags: 0,
+        };
+        (raw, length)
+    }
+}
+
+/// The power of two that takes a positive number into [1,2); the largest for 0.
+#[inline]
+fn inverse_power(x: f32) -> f32 {
+    let exponent = (x.to_bits() >> 23).clamp(1, 253);
+    f32::from_bits((254 - exponent) << 23)
 }
 
 impl Visibility for Embree {
@@ -68,7 +98,8 @@ impl Visibility for Embree {
     fn intersect(&self, ray: &Ray) -> Option<Hit> {
         // SAFETY: all fields are numbers or nullable pointers.
         let mut query: sys::RTCRayHit = unsafe { mem::zeroed() };
-        query.ray = raw(ray);
+        let (scaled, length) = self.scaled(ray);
+        query.ray = scaled;
         query.hit.geomID = sys::RTC_INVALID_GEOMETRY_ID;
         // SAFETY: likewise; null pointers mean defaults.
         let mut arguments: sys::RTCIntersectArguments = unsafe { mem::zeroed() };
@@ -81,13 +112,13 @@ impl Visibility for Embree {
             triangle: query.hit.primID,
             u: query.hit.u,
             v: query.hit.v,
-            t: query.ray.tfar,
+            t: query.ray.tfar * length,
         })
     }
 
     #[inline]
     fn occluded(&self, ray: &Ray) -> bool {
-        let mut query = raw(ray);
+        let (mut query, _) = self.scaled(ray);
         // SAFETY: all fields are numbers or nullable pointers; null means default.
         let mut arguments: sys::RTCOccludedArguments = unsafe { mem::zeroed() };
         arguments.flags = sys::RTC_RAY_QUERY_FLAG_INCOHERENT;
@@ -96,25 +127,6 @@ impl Visibility for Embree {
         unsafe { sys::rtcOccluded1(self.scene.0, &mut query, &mut arguments) };
         // A hit is told by a distance of -inf.
         query.tfar < 0.0
-    }
-}
-
-#[inline]
-fn raw(ray: &Ray) -> sys::RTCRay {
-    sys::RTCRay {
-        org_x: ray.origin.x,
-        org_y: ray.origin.y,
-        org_z: ray.origin.z,
-        tnear: ray.t_min,
-        dir_x: ray.direction.x,
-        dir_y: ray.direction.y,
-        dir_z: ray.direction.z,
-        time: 0.0,
-        tfar: ray.t_max,
-        mask: u32::MAX,
-        // Embree overwrites `tfar` with candidates; `confirm` needs the limit that was asked for.
-        id: ray.t_max.to_bits(),
-        flags: 0,
     }
 }
 
@@ -314,9 +326,33 @@ mod tests {
     }
 
     #[test]
-    fn coordinates_that_embree_would_drop_are_refused() {
-        let positions = vec![glam::Vec3::ZERO, glam::Vec3::X, glam::Vec3::Y * 2e18];
-        let mesh = Mesh { positions, triangles: vec![[0, 1, 2]], materials: vec![0], ..Mesh::default() };
-        assert!(matches!(Embree::new(&mesh, 1), Err(Error::Input(_))));
+    fn powers_of_two_are_exact_inverses() {
+        for (x, y) in [
+            (1.0, 1.0),
+            (1.99, 1.0),
+            (2.0, 0.5),
+            (3.0e38, 2f32.powi(-126)),
+            (0.3, 4.0),
+            (0.0, 2f32.powi(126)),
+        ] {
+            assert_eq!(inverse_power(x), y, "{x}");
+        }
+    }
+
+    #[test]
+    fn sizes_beyond_embrees_own_range_are_fine() {
+        for scale in [1e-30, 1e-12, 1e12, 1e30] {
+            let positions = [Vec3::ZERO, Vec3::X, Vec3::Y].map(|p| p * scale).to_vec();
+            let mesh = Mesh { positions, triangles: vec![[0, 1, 2]], materials: vec![0], ..Mesh::default() };
+            let embree = Embree::new(&mesh, 1).unwrap();
+            for length in [scale, 1.0] {
+                let origin = Vec3::new(0.25, 0.5, 4.0) * scale;
+                let ray = Ray { origin, direction: -Vec3::Z * length, t_min: 0.0, t_max: f32::INFINITY };
+                let hit = embree.intersect(&ray).unwrap();
+                for (value, expected) in [(hit.u, 0.25), (hit.v, 0.5), (hit.t, 4.0 * scale / length)] {
+                    assert!((value / expected - 1.0).abs() < 1e-6, "{scale} {length} {hit:?}");
+                }
+            }
+        }
     }
 }

@@ -35,6 +35,7 @@ fn samplers_draw_what_their_densities_say() {
             // The direction drawn must not depend on the transport: each takes half the tests.
             let transport = [Transport::Radiance, Transport::Importance][(i + j / 2) % 2];
             let outcome = test(case, &case.bsdf, wo, transport);
+            assert_eq!(outcome.outside, 0, "{} from {wo}", case.name);
             family.add(format!("{} from {wo}: {outcome:?}", case.name), outcome.p);
         }
     }

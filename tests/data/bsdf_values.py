@@ -24,7 +24,7 @@ def normalize(v):
 
 
 def distribution(m, ax, ay):
-    """D with the angles of the normal [Heitz 2014, eq. 85]."""
+    """D with the angles of the normal [Heitz 2014]."""
     cos2 = m[2] ** 2
     sin2 = m[0] ** 2 + m[1] ** 2
     tan2 = sin2 / cos2
@@ -33,7 +33,7 @@ def distribution(m, ax, ay):
 
 
 def smith_lambda(w, ax, ay):
-    """Lambda [Heitz 2014, eq. 86]."""
+    """Lambda [Heitz 2014]."""
     a2 = ((ax * w[0]) ** 2 + (ay * w[1]) ** 2) / w[2] ** 2
     return ((1 + a2).sqrt() - 1) / 2
 

@@ -9,6 +9,7 @@ pub mod distribution;
 pub mod estimate;
 pub mod quadrature;
 pub mod scenes;
+pub mod shapes;
 pub mod stats;
 
 use glam::DVec2;

@@ -10,6 +10,8 @@ use std::time::{Duration, Instant};
 
 /// Lines that are not on a terminal come no faster than this.
 const BETWEEN_LINES: Duration = Duration::from_secs(2);
+/// The bar and the line after it, cut to the width of the terminal.
+const TEMPLATE: &str = "[{bar:16}] {percent:>3} %  {wide_msg}";
 /// Steps of the bar.
 const STEPS: u64 = 1000;
 
@@ -115,7 +117,7 @@ impl Observer for Reporter {
 fn bar() -> ProgressBar {
     let bar = ProgressBar::with_draw_target(Some(STEPS), ProgressDrawTarget::stderr_with_hz(8));
     // The template is a constant: it parses, or the tests say so.
-    if let Ok(style) = ProgressStyle::with_template("[{bar:24}] {percent:>3} %  {msg}") {
+    if let Ok(style) = ProgressStyle::with_template(TEMPLATE) {
         bar.set_style(style.progress_chars("=> "));
     }
     bar
@@ -172,7 +174,7 @@ mod tests {
 
     #[test]
     fn the_bar_has_a_style() {
-        ProgressStyle::with_template("[{bar:24}] {percent:>3} %  {msg}").unwrap();
+        ProgressStyle::with_template(TEMPLATE).unwrap();
     }
 
     #[test]
