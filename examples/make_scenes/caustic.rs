@@ -85,8 +85,10 @@ height = 150
 
 [render]
 max_depth      = 24
-iterations     = 64
-light_subpaths = 200000
+iterations     = 8
+# Noise falls with the product of the two, time grows with their sum: few large iterations.
+light_subpaths = 2000000
+samples        = 24
 ";
 
 /// A brass strip under a small lamp; its caustic is seen in a mirror of roughness 1e-4.
