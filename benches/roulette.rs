@@ -25,7 +25,7 @@ fn run(bvh: &VertexBvh, queries: &[Query<'_>], brute: bool) -> (f64, QueryCounte
 }
 
 /// Repetitions of which the fastest counts.
-const RUNS: usize = 3;
+const RUNS: usize = 25;
 
 /// The best of some runs: what the code needs, without what the neighbours took.
 fn best(bvh: &VertexBvh, queries: &[Query<'_>]) -> (f64, QueryCounters) {

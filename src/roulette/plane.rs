@@ -225,7 +225,7 @@ impl<S: Simd> Box8<S> {
         let u = t2.mul_add(lobe.a2, z * z).sqrt();
         let w = u + z.abs();
         let inv_uw = 1.0 / (u * w);
-        let (half_inv_u, t2_w) = (w * inv_uw * 0.5, t2 * u * inv_uw);
+        let (half_inv_u, t2_w) = (w * inv_uw * 0.5, t2 * (u * inv_uw));
         let side = half_inv_u * (1.0 + lobe.a2);
         let front = z.simd_gt(0.0).select(w - t2_w, t2_w * lobe.a2 - w * lobe.inv_a2);
         let (gx, gy, gz) = (x * side, y * side, front * half_inv_u);
@@ -242,4 +242,169 @@ impl<S: Simd> Box8<S> {
 #[inline(always)]
 fn positive<S: Simd>(bound: f32x8<S>) -> f32x8<S> {
     bound.simd_gt(0.0).select(bound, f32x8::splat(bound.simd, 0.0))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::Frame;
+    use fearless_simd::{Level, dispatch};
+    use glam::DVec3;
+    use proptest::prelude::*;
+
+    /// The f32 bounds of eight boxes, by the instruction set at hand.
+    fn bounds(lobe: &Lobe, constant: f64, boxes: &[[[f32; 8]; 3]; 2], eye: DVec3, points: bool) -> [f32; 8] {
+        let flat = FlatLobe::new(lobe, constant).unwrap();
+        let high = eye.as_vec3();
+        let low = (eye - high.as_dvec3()).as_vec3().to_array();
+        let mut out = [0.0; 8];
+        dispatch!(Level::new(), simd => {
+            let center = Vec8::relative(simd, &boxes[0], high.to_array(), low);
+            let b = if points {
+                Box8::around_points(center).bound::<true>(&flat)
+            } else {
+                Box8::new(simd, center, &boxes[1]).bound::<false>(&flat)
+            };
+            b.store_slice(&mut out);
+        });
+        out
+    }
+
+    fn unit_vector() -> impl Strategy<Value = DVec3> {
+        (-1.0..1.0f64, 0.0..std::f64::consts::TAU).prop_map(|(z, phi)| {
+            let r = (1.0 - z * z).sqrt();
+            DVec3::new(r * phi.cos(), r * phi.sin(), z)
+        })
+    }
+
+    fn exponent(range: std::ops::Range<f64>) -> impl Strategy<Value = f64> {
+        range.prop_map(|e| 10f64.powf(e))
+    }
+
+    prop_compose! {
+        /// A lobe with a box near its axis, whose place it matters to know well, and points of the box.
+        fn cases()(
+            axis in unit_vector(), tangent in unit_vector(),
+            ax in exponent(-7.0..0.0), aspect in exponent(-3.0..3.0),
+            weight in exponent(-6.0..14.0), scale in exponent(-6.0..6.0),
+            distance in exponent(-3.0..1.0), off in unit_vector(), aside in exponent(-7.0..0.0),
+            half in (exponent(-7.0..0.0), exponent(-7.0..0.0), exponent(-7.0..0.0)),
+            far in prop_oneof![Just(0.0), Just(1.0), Just(1e5)],
+            eye in unit_vector(),
+            inside in prop::collection::vec((-1.0..=1.0f64, -1.0..=1.0f64, -1.0..=1.0f64), 8),
+        ) -> (Lobe, [[[f32; 8]; 3]; 2], DVec3, Vec<DVec3>) {
+            let frame = Frame::from_z_tangent(axis, tangent);
+            let lobe = Lobe::new(frame, ax, (ax * aspect).clamp(1e-7, 1.0), weight);
+            let eye = eye * (far * scale);
+            let center = eye + (axis * distance + off * (distance * aside)) * scale;
+            let half = DVec3::new(half.0, half.1, half.2) * (distance * scale);
+            let mut boxes = [[[0.0; 8]; 3]; 2];
+            for lane in 0..8 {
+                // Eight boxes, from the whole one down to a point.
+                let h = half * 10f64.powi(-(lane as i32));
+                let h = if lane == 7 { DVec3::ZERO } else { h };
+                for axis in 0..3 {
+                    boxes[0][axis][lane] = center[axis] as f32;
+                    boxes[1][axis][lane] = h[axis] as f32;
+                }
+            }
+            (lobe, boxes, eye, inside.into_iter().map(DVec3::from).collect())
+        }
+    }
+
+    /// Points of a box to which a bound must not be above: random ones, corners, and the nearest to the axis and
+    /// to the eye.
+    fn probes(lobe: &Lobe, center: DVec3, half: DVec3, inside: &[DVec3]) -> Vec<DVec3> {
+        let mut probes: Vec<_> = inside.iter().map(|s| center + half * *s).collect();
+        for corner in 0..8 {
+            let sign = |bit: i32| if corner >> bit & 1 == 0 { -1.0 } else { 1.0 };
+            probes.push(center + half * DVec3::new(sign(0), sign(1), sign(2)));
+        }
+        let (lo, hi) = (center - half, center + half);
+        let mut near = center;
+        for _ in 0..20 {
+            near = (lobe.frame().z * lobe.frame().z.dot(near).max(0.0)).clamp(lo, hi);
+            probes.push(near);
+        }
+        probes.push(DVec3::ZERO.clamp(lo, hi));
+        probes
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig { cases: 4000, failure_persistence: None, ..ProptestConfig::default() })]
+
+        #[test]
+        fn no_bound_is_above_a_point_of_its_box((lobe, boxes, eye, inside) in cases()) {
+            let scale = lobe.weight().sqrt().recip();
+            let (wide, narrow) = (bounds(&lobe, 1.0, &boxes, eye, false), bounds(&lobe, 1.0, &boxes, eye, true));
+            for lane in 0..8 {
+                let at = |v: &[[f32; 8]; 3]| DVec3::new(v[0][lane].into(), v[1][lane].into(), v[2][lane].into());
+                let (center, half) = (at(&boxes[0]) - eye, at(&boxes[1]));
+                for p in probes(&lobe, center, half, &inside) {
+                    let h = lobe.h(p) * scale;
+                    // What the walk allows for after the bound: a square's worth of 1e-5.
+                    prop_assert!(f64::from(wide[lane]) <= h * (1.0 + 4e-6), "lane {lane}: {} > {h}", wide[lane]);
+                }
+                let h = lobe.h(center) * scale;
+                prop_assert!(f64::from(narrow[lane]) <= h * (1.0 + 4e-6), "point {lane}: {} > {h}", narrow[lane]);
+            }
+        }
+    }
+
+    #[test]
+    fn bounds_of_points_are_tight() {
+        // A bound of 0 everywhere would pass the test above.
+        let frame = Frame::from_z_tangent(DVec3::new(0.3, -0.5, 0.8).normalize(), DVec3::X);
+        for (alpha, tolerance) in [(1e-1, 1e-5), (1e-3, 1e-3), (1e-4, 1e-2)] {
+            let lobe = Lobe::new(frame, alpha, 2.0 * alpha, 3.0);
+            let at = frame.to_world(DVec3::new(2.0 * alpha, alpha, 1.0));
+            let mut boxes = [[[0.0; 8]; 3]; 2];
+            for axis in 0..3 {
+                boxes[0][axis] = [at[axis] as f32; 8];
+            }
+            let stored = DVec3::from_array(boxes[0].map(|v| f64::from(v[0])));
+            let h = lobe.h(stored) / 3f64.sqrt();
+            for points in [false, true] {
+                let b = f64::from(bounds(&lobe, 1.0, &boxes, DVec3::ZERO, points)[3]);
+                assert!(b > h * (1.0 - tolerance), "{alpha}: {b} {h}");
+            }
+        }
+    }
+
+    #[test]
+    fn most_disjoint_boxes_near_the_lobe_are_culled() {
+        // Boxes of the size of a range, about twice its width beside the axis; disjoint says a fine search.
+        use crate::sampler::counter::{mix, unit};
+        let u = |i: u64, k: u64| unit(mix(mix(i) ^ k));
+        let (mut disjoint, mut culled) = (0, 0);
+        for i in 0..3000u64 {
+            let axis = (DVec3::new(u(i, 1), u(i, 2), u(i, 3)) * 2.0 - 1.0).normalize();
+            let frame = Frame::from_z_tangent(axis, DVec3::new(u(i, 4), u(i, 5), u(i, 6)) - 0.5);
+            let alpha = 1e-3;
+            let lobe = Lobe::new(frame, alpha, alpha, 1.0);
+            let center = frame.to_world(DVec3::new(
+                (u(i, 7) - 0.5) * 8.0 * alpha,
+                (u(i, 8) - 0.5) * 8.0 * alpha,
+                u(i, 9),
+            ));
+            let half = DVec3::new(u(i, 10), u(i, 11), u(i, 12)) * (2.0 * alpha);
+            let mut boxes = [[[0.0; 8]; 3]; 2];
+            for axis in 0..3 {
+                boxes[0][axis] = [center[axis] as f32; 8];
+                boxes[1][axis] = [half[axis] as f32; 8];
+            }
+            let mut least = f64::INFINITY;
+            for n in 0..9i32.pow(3) {
+                let s = DVec3::new(f64::from(n % 9), f64::from(n / 9 % 9), f64::from(n / 81)) / 4.0 - 1.0;
+                least = least.min(lobe.h(center + half * s));
+            }
+            // Ranges of sizes (reach 1) that miss every probe by a tenth.
+            if least > 1.1 {
+                disjoint += 1;
+                culled += u32::from(bounds(&lobe, 1.0, &boxes, DVec3::ZERO, false)[0] > 1.0);
+            }
+        }
+        let share = f64::from(culled) / f64::from(disjoint);
+        assert!(disjoint > 300 && share > 0.93, "{culled} of {disjoint}");
+    }
 }
