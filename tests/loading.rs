@@ -156,7 +156,9 @@ fn a_scene_without_triangles_is_refused() {
     assert_eq!(obj_error("# nothing\nv 0 0 0\n"), "s.obj: the scene has no triangles");
     assert_eq!(obj_error(""), "s.obj: the scene has no triangles");
     assert_eq!(obj_error("v 0 0 0\nv 1 1 1\nv 2 2 2\nf 1 2 3\n"), "s.obj: the scene has no triangles");
-    assert_eq!(toml_error("[film]\nwidth = 4\n"), ("s.toml: the scene has no triangles".into(), 3));
+    let missing = "s.toml: no geometry: obj = [\"scene.obj\"] is missing";
+    assert_eq!(toml_error("[film]\nwidth = 4\n"), (missing.into(), 3));
+    assert_eq!(toml_error("obj = []\n"), (missing.into(), 3));
 }
 
 #[test]

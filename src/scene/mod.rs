@@ -84,6 +84,9 @@ impl Scene {
         if bare {
             gathering.add(path, &mut inputs, &mut notes)?;
         }
+        if !bare && file.objs.is_empty() {
+            return Err(Error::scene(Place::file(path), "no geometry: obj = [\"scene.obj\"] is missing"));
+        }
         let folder = path.parent().unwrap_or(Path::new(""));
         for (name, at) in &file.objs {
             let obj = folder.join(name);
