@@ -343,4 +343,91 @@ mod tests {
         assert!(fine_unit(0) > 0.0 && fine_unit(0) < 1e-19);
         assert!(fine_unit(u64::MAX) <= 1.0);
     }
+
+    /// The numbers of all leaves below a node of the perfect tree, in order, as the walk deals them.
+    fn leaves<D: Deal>(deal: D, node: NodeId, number: D::Number, out: &mut Vec<f64>) {
+        let mut children = [number; WIDTH];
+        let (first, mut least) = (out.len(), [0.0; WIDTH]);
+        fearless_simd::dispatch!(fearless_simd::Level::new(), simd => {
+            let eight = deal.eight(simd, number, node);
+            D::push(simd, &mut children, &eight, 0xff);
+            D::bounds(simd, &eight).store_slice(&mut least);
+            if node.level == 0 {
+                out.extend((0..WIDTH).map(|lane| deal.leaf(&eight, node, lane)));
+            }
+        });
+        if node.level > 0 {
+            for lane in 0..WIDTH {
+                let before = out.len();
+                leaves(deal, node.child(lane as u32), children[lane], out);
+                let bound = f64::from(least[lane]) * (1.0 - 1e-7);
+                assert!(out[before..].iter().all(|&x| x >= bound), "a node's number is below its leaves'");
+            }
+        } else {
+            assert!((first..out.len()).all(|i| out[i] >= f64::from(least[i - first]) * (1.0 - 1e-7)));
+        }
+    }
+
+    #[test]
+    fn the_perfect_tree_deals_uniform_leaves() {
+        fn check<D: Deal>(deal: impl Fn(u64) -> D) {
+            let node = NodeId { level: 1, index: 0 };
+            let (mut all, mut out) = (vec![Vec::new(); 64], Vec::new());
+            let mut pairs = [0.0; 3];
+            let n = 20_000;
+            for key in 0..n {
+                let deal = deal(mix(key));
+                out.clear();
+                leaves(deal, node, deal.root(64.0), &mut out);
+                for (all, &x) in all.iter_mut().zip(&out) {
+                    all.push(x);
+                }
+                // Sisters, cousins, and a far threshold: below 1/2 together, below 1/10 together.
+                pairs[0] += (out[0] - 0.5) * (out[1] - 0.5);
+                pairs[1] += (out[0] - 0.5) * (out[9] - 0.5);
+                pairs[2] += f64::from(out[0] < 0.1 && out[63] < 0.1) - 0.01;
+            }
+            for x in &mut all {
+                x.sort_unstable_by(f64::total_cmp);
+                let n = x.len() as f64;
+                let d =
+                    x.iter().enumerate().map(|(i, x)| (x - (i as f64 + 0.5) / n).abs()).fold(0.0, f64::max);
+                assert!(d * n.sqrt() < 2.5, "sqrt(n) D = {}", d * n.sqrt());
+            }
+            // No positive covariance: 4.5 standard errors of independent numbers at most.
+            let n = n as f64;
+            assert!(pairs[0] / n < 4.5 / 12.0 / n.sqrt() && pairs[1] / n < 4.5 / 12.0 / n.sqrt());
+            assert!(pairs[2] / n < 4.5 * 0.1 / n.sqrt());
+        }
+        check(|key| Nested { key });
+        check(|key| SemiStratified { key });
+        check(|key| Exact { key });
+    }
+
+    #[test]
+    fn nested_numbers_lie_on_their_grid_to_the_ends_of_the_strata() {
+        // The greatest number a lane can be dealt stays below 1 in f32, and its cell ends at 1.
+        let greatest = ((7 << 21) | ((1 << 21) - 1)) as f32 * (1.0 / (1u64 << 24) as f32);
+        assert!(greatest < 1.0 && f64::from(greatest) + cell(-1) == 1.0);
+        for (number, exponent) in [(0.125f32, -3), (0.99, -1), (1.0 / 64.0, -6), (0.1, -4)] {
+            assert_eq!((number.to_bits() >> 23) as i32 - 127, exponent);
+            let below = 8f64.powi(-(-exponent - 1) / 3);
+            assert_eq!(cell(exponent), below * 2f64.powi(-24), "{number}");
+        }
+        for key in 0..1000 {
+            let x = f64::from(Nested { key }.root(1.0));
+            assert_eq!((x / cell((x.to_bits() >> 52) as i32 - 1023)).fract(), 0.0);
+        }
+    }
+
+    #[test]
+    fn dealing_is_the_same_with_and_without_vector_instructions() {
+        for bits in [0, u64::MAX, 0x0123_4567_89ab_cdef] {
+            let mut lanes = [0; WIDTH];
+            fearless_simd::dispatch!(fearless_simd::Level::new(), simd => {
+                lane_bits_simd(simd, bits as u32, (bits >> 32) as u32).store_slice(&mut lanes);
+            });
+            assert_eq!(lanes, lane_bits(bits));
+        }
+    }
 }
