@@ -5,7 +5,7 @@
 //! `cargo bench --bench integrators -- rays`
 
 #[path = "support/workload.rs"]
-#[allow(dead_code)]
+#[expect(dead_code, reason = "only its clock is wanted")]
 mod workload;
 
 use hrr::film::Film;
@@ -17,6 +17,7 @@ use hrr::visibility::{Hit, Ray, Visibility};
 use std::path::Path;
 use std::sync::{Arc, Mutex};
 use std::time::Instant;
+use workload::cpu_seconds;
 
 fn main() {
     let args: Vec<String> = std::env::args().skip(1).filter(|a| !a.starts_with("--")).collect();
@@ -36,99 +37,107 @@ fn load(name: &str) -> Scene {
     Scene::load(&path, &[]).expect("a scene of the project")
 }
 
-/// Sums over iterations, for the variance of each pixel.
+/// An integrator and the film that it fills.
 struct Contender<'a> {
     name: String,
     integrator: Box<dyn hrr::integrator::Integrator + 'a>,
-    sum: Vec<f64>,
-    square: Vec<f64>,
+    film: Film,
     iterations: u64,
     seconds: f64,
 }
 
-impl Contender<'_> {
-    fn iterate(&mut self, scene: &Scene) {
-        let mut film = Film::new(&scene.film);
-        let start = Instant::now();
-        self.integrator.iterate(self.iterations, &mut film, &|_| ()).expect("an iteration");
-        self.seconds += start.elapsed().as_secs_f64();
-        self.iterations += 1;
-        for (i, (sum, square)) in self.sum.iter_mut().zip(&mut self.square).enumerate() {
-            let (x, y) = (i as u32 % film.width(), i as u32 / film.width());
-            let v = luminance(film.mean(x, y));
-            *sum += v;
-            *square += v * v;
+impl<'a> Contender<'a> {
+    fn new(name: &str, world: &'a World<'a>, settings: &'a Settings) -> Self {
+        Self {
+            name: format!("{name}, {} light subpaths, {} samples", settings.light_subpaths, settings.samples),
+            integrator: hrr::integrator::new(world, settings),
+            film: Film::new(&world.scene.film),
+            iterations: 0,
+            seconds: 0.0,
         }
     }
 
-    /// The mean over pixels of the variance that one second leaves, all pixels and without the worst hundredth.
-    fn variance_seconds(&self, pixels: &[usize]) -> (f64, f64) {
-        let n = self.iterations as f64;
-        let mut v: Vec<f64> = pixels
-            .iter()
-            .map(|&i| (self.square[i] / n - (self.sum[i] / n).powi(2)) * n / (n - 1.0) * self.seconds / n)
-            .collect();
-        v.sort_by(f64::total_cmp);
-        let mean = |v: &[f64]| v.iter().sum::<f64>() / v.len() as f64;
-        (mean(&v), mean(&v[..v.len() - v.len() / 100]))
+    fn iterate(&mut self) {
+        let start = Instant::now();
+        self.integrator.iterate(self.iterations, &mut self.film, &|_| ()).expect("an iteration");
+        self.seconds += start.elapsed().as_secs_f64();
+        self.iterations += 1;
     }
 
-    fn mean(&self, pixels: &[usize]) -> f64 {
-        pixels.iter().map(|&i| self.sum[i]).sum::<f64>() / (self.iterations as f64 * pixels.len() as f64)
+    fn luminances(&self, pixels: &[(u32, u32)]) -> Vec<f64> {
+        pixels.iter().map(|&(x, y)| luminance(self.film.mean(x, y))).collect()
     }
 }
 
-/// Variance in the mirror's pixels at equal time: plain picks from the cache against the roulette. Iterations are run
-/// in turn, each side getting the same time.
+/// Mean square difference: of all pixels, and without the worst hundredth of them.
+fn mse(a: &[f64], b: &[f64]) -> [f64; 2] {
+    let mut squares: Vec<f64> = a.iter().zip(b).map(|(a, b)| (a - b) * (a - b)).collect();
+    squares.sort_by(f64::total_cmp);
+    let mean = |v: &[f64]| v.iter().sum::<f64>() / v.len() as f64;
+    [mean(&squares), mean(&squares[..squares.len() - squares.len() / 100])]
+}
+
+/// The error in the mirror's pixels at equal time: plain picks from the cache, with small and with large iterations,
+/// against the roulette. The reference is two long renders with the roulette and other seeds; its own variance, told by
+/// their difference, is taken off the errors. Iterations are run in turn.
 fn caustic(name: &str, seconds: f64, light_subpaths: u64, samples: u32) {
     let scene = load(name);
-    let plain = Settings { integrator: Integrator::Lvc, ..scene.settings.clone() };
-    let many = Settings { integrator: Integrator::Lvc, light_subpaths, samples, ..plain.clone() };
-    let roulette = Settings { integrator: Integrator::LvcHrr, ..many.clone() };
-    let world = World::new(&scene, &plain).expect("a world");
+    let roulette =
+        Settings { integrator: Integrator::LvcHrr, light_subpaths, samples, ..scene.settings.clone() };
+    let large = Settings { integrator: Integrator::Lvc, ..roulette.clone() };
+    let small = Settings { light_subpaths: 0, samples: 1, ..large.clone() };
+    let seeds = [1, 2].map(|seed| Settings { seed, ..roulette.clone() });
+    let world = World::new(&scene, &roulette).expect("a world");
     let camera = &world.camera;
-    let pixels: Vec<usize> = (0..scene.film.width * scene.film.height)
-        .filter(|i| {
-            let at = glam::DVec2::new((i % scene.film.width).into(), (i / scene.film.width).into()) + 0.5;
-            let direction = camera.direction(at);
+    let pixels: Vec<(u32, u32)> = (0..scene.film.width * scene.film.height)
+        .map(|i| (i % scene.film.width, i / scene.film.width))
+        .filter(|&(x, y)| {
+            let direction = camera.direction(glam::DVec2::new(x.into(), y.into()) + 0.5);
             let ray = hrr::visibility::offset::from_free_point(camera.position, direction);
             world.intersect(&ray, camera.position, direction).is_some_and(|p| {
                 scene.materials[scene.mesh.materials[p.triangle as usize] as usize].name == "mirror"
             })
         })
-        .map(|i| i as usize)
         .collect();
     assert!(!pixels.is_empty(), "no pixel sees a material named 'mirror'");
-    let size = (scene.film.width * scene.film.height) as usize;
-    let contender = |name: String, settings| Contender {
-        name,
-        integrator: hrr::integrator::new(&world, settings),
-        sum: vec![0.0; size],
-        square: vec![0.0; size],
-        iterations: 0,
-        seconds: 0.0,
-    };
-    let sizes = format!("{light_subpaths} light subpaths, {samples} samples");
-    let mut contenders = [
-        contender("lvc, a subpath and a sample per pixel".into(), &plain),
-        contender(format!("lvc, {sizes}"), &many),
-        contender(format!("lvc+hrr, {sizes}"), &roulette),
+    let mut runs = [
+        Contender::new("lvc", &world, &small),
+        Contender::new("lvc", &world, &large),
+        Contender::new("lvc+hrr", &world, &roulette),
+        Contender::new("reference", &world, &seeds[0]),
+        Contender::new("reference", &world, &seeds[1]),
     ];
-    while contenders.iter().any(|c| c.seconds < seconds || c.iterations < 4) {
-        let next = contenders.iter_mut().min_by(|a, b| a.seconds.total_cmp(&b.seconds));
-        next.expect("three of them").iterate(&scene);
+    // References get twice the time each.
+    let share = |i: usize| if i < 3 { 1.0 } else { 2.0 };
+    while let Some((_, next)) = runs
+        .iter_mut()
+        .enumerate()
+        .filter(|(i, run)| run.seconds < seconds * share(*i))
+        .min_by(|(i, a), (j, b)| (a.seconds / share(*i)).total_cmp(&(b.seconds / share(*j))))
+    {
+        next.iterate();
     }
-    println!("{name}: {} pixels of the mirror, {seconds} s each", pixels.len());
-    let (all, trimmed) = contenders[2].variance_seconds(&pixels);
-    for c in &contenders {
-        let (v, t) = c.variance_seconds(&pixels);
+    let [a, b] = [3, 4].map(|i| runs[i].luminances(&pixels));
+    let reference: Vec<f64> = a.iter().zip(&b).map(|(a, b)| (a + b) / 2.0).collect();
+    let noise = mse(&a, &b).map(|d| d / 4.0);
+    println!(
+        "{name}: {} pixels of the mirror, {seconds} s each; reference's own MSE {noise:.2e?}",
+        pixels.len()
+    );
+    let errors = |run: &Contender<'_>| {
+        let measured = mse(&run.luminances(&pixels), &reference);
+        [0, 1].map(|k| measured[k] - noise[k])
+    };
+    let ours = errors(&runs[2]);
+    for run in &runs[..3] {
+        let [all, trimmed] = errors(run);
         println!(
-            "  {:44} {:4} iterations  mean {:.5}  variance x s {v:.4e} (x{:.2})  without the worst 1 % {t:.4e} (x{:.2})",
-            c.name,
-            c.iterations,
-            c.mean(&pixels),
-            v / all,
-            t / trimmed
+            "  {:46} {:4} iterations, {:5.1} s: MSE {all:.3e} (x{:.2}), without the worst 1 % {trimmed:.3e} (x{:.2})",
+            run.name,
+            run.iterations,
+            run.seconds,
+            all / ours[0],
+            trimmed / ours[1]
         );
     }
 }
@@ -169,10 +178,11 @@ fn rays() {
         let mut tracer = hrr::integrator::new(&world, &settings);
         let mut ratios = Vec::new();
         for round in 0..9 {
-            let start = Instant::now();
+            // This thread's processor time, so that other programs on the machine do not count.
+            let start = cpu_seconds();
             tracer.iterate(0, &mut Film::new(&scene.film), &|_| ()).expect("an iteration");
-            let whole = start.elapsed().as_secs_f64();
-            let start = Instant::now();
+            let whole = cpu_seconds() - start;
+            let start = cpu_seconds();
             let hits = rays
                 .iter()
                 .filter(|(ray, shadow)| {
@@ -183,7 +193,7 @@ fn rays() {
                     }
                 })
                 .count();
-            let raw = start.elapsed().as_secs_f64();
+            let raw = cpu_seconds() - start;
             assert!(hits > 0);
             let rate = |s: f64| rays.len() as f64 / s * 1e-6;
             println!(

@@ -2,6 +2,7 @@
 //! `cargo bench --bench vertex_bvh`.
 
 #[path = "support/workload.rs"]
+#[expect(dead_code, reason = "queries are not timed here")]
 mod workload;
 
 use hrr::vertex_bvh::VertexBvh;

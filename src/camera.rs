@@ -2,8 +2,37 @@
 
 use crate::error::{Error, Result};
 use crate::math::Frame;
-use crate::scene::{CameraSettings, FilmSettings};
 use glam::{DVec2, DVec3};
+
+/// A perspective camera as a scene file gives it; world coordinates.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CameraSettings {
+    /// Centre of projection.
+    pub origin: DVec3,
+    /// A point in the middle of the image.
+    pub target: DVec3,
+    /// A direction that appears upward.
+    pub up: DVec3,
+    /// Full vertical angle, degrees.
+    pub fov_y: f64,
+    /// Lens radius, world units; 0 is a pinhole.
+    pub aperture_radius: f64,
+    /// Distance in perfect focus, world units.
+    pub focus_distance: f64,
+}
+
+impl Default for CameraSettings {
+    fn default() -> Self {
+        Self {
+            origin: DVec3::new(0.0, 0.0, 1.0),
+            target: DVec3::ZERO,
+            up: DVec3::Y,
+            fov_y: 40.0,
+            aperture_radius: 0.0,
+            focus_distance: 1.0,
+        }
+    }
+}
 
 /// A pinhole camera over a raster of square pixels; raster x grows to the right, y downward.
 #[derive(Debug, Clone)]
@@ -18,8 +47,9 @@ pub struct Camera {
 }
 
 impl Camera {
-    /// A camera relative to `origin`, the world position that the mesh calls zero.
-    pub fn new(camera: &CameraSettings, film: &FilmSettings, origin: DVec3) -> Result<Self> {
+    /// A camera for images of `(width, height)` pixels, relative to `origin`, the world position that the mesh calls
+    /// zero.
+    pub fn new(camera: &CameraSettings, (width, height): (u32, u32), origin: DVec3) -> Result<Self> {
         let z = camera.origin - camera.target;
         let x = camera.up.cross(z);
         if !(x.length_squared() > 0.0) || !x.is_finite() {
@@ -33,11 +63,11 @@ impl Camera {
                 camera.fov_y
             )));
         }
-        if film.width == 0 || film.height == 0 {
-            return Err(Error::Input(format!("film: {}x{} has no pixel", film.width, film.height)));
+        if width == 0 || height == 0 {
+            return Err(Error::Input(format!("film: {width}x{height} has no pixel")));
         }
         let (x, z) = (x.normalize(), z.normalize());
-        let resolution = DVec2::new(film.width.into(), film.height.into());
+        let resolution = DVec2::new(width.into(), height.into());
         let pixel = 2.0 * (camera.fov_y.to_radians() * 0.5).tan() / resolution.y;
         Ok(Self { position: camera.origin - origin, frame: Frame { x, y: z.cross(x), z }, resolution, pixel })
     }
@@ -70,8 +100,9 @@ impl Camera {
 mod tests {
     use super::*;
 
-    fn camera() -> (Camera, FilmSettings) {
-        let film = FilmSettings { width: 64, height: 48, ..Default::default() };
+    const SIZE: (u32, u32) = (64, 48);
+
+    fn camera() -> Camera {
         let settings = CameraSettings {
             origin: DVec3::new(1.0, 2.0, 3.0),
             target: DVec3::new(-1.0, 0.5, 0.2),
@@ -79,17 +110,17 @@ mod tests {
             fov_y: 70.0,
             ..Default::default()
         };
-        (Camera::new(&settings, &film, DVec3::new(5.0, 0.0, 0.0)).unwrap(), film)
+        Camera::new(&settings, SIZE, DVec3::new(5.0, 0.0, 0.0)).unwrap()
     }
 
     #[test]
     fn ray_and_raster_are_inverse() {
-        let (camera, film) = camera();
+        let camera = camera();
         for i in 0..=64 {
             for j in 0..=48 {
                 let raster = DVec2::new(
-                    (f64::from(i) + 1e-6) / 64.001 * f64::from(film.width),
-                    (f64::from(j) + 1e-6) / 48.001 * f64::from(film.height),
+                    (f64::from(i) + 1e-6) / 64.001 * f64::from(SIZE.0),
+                    (f64::from(j) + 1e-6) / 48.001 * f64::from(SIZE.1),
                 );
                 let back = camera.raster(camera.direction(raster) * 3.7).unwrap();
                 assert!((back - raster).length() < 1e-9, "{raster} {back}");
@@ -103,7 +134,7 @@ mod tests {
     #[test]
     fn pixel_density_integrates_to_one() {
         // The solid angle of a corner pixel, by midpoint rule over the pixel, must equal the mean of 1 / pdf_w.
-        let (camera, _) = camera();
+        let camera = camera();
         let n = 64;
         let (mut angle, mut inverse) = (0.0, 0.0);
         for i in 0..n {

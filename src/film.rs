@@ -6,7 +6,6 @@
 use crate::error::{Error, Result};
 use crate::image::Image;
 use crate::math::Spectrum;
-use crate::scene::{FilmSettings, Filter};
 use glam::{DVec2, Vec3};
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -17,6 +16,33 @@ const ONE: f64 = (1u128 << 64) as f64;
 const GAUSSIAN: (f64, f64) = (0.5, 1.5);
 
 type Pixel = [i128; 3];
+
+/// The image as a scene file gives it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FilmSettings {
+    /// Pixels across.
+    pub width: u32,
+    /// Pixels down.
+    pub height: u32,
+    /// Reconstruction filter.
+    pub filter: Filter,
+}
+
+impl Default for FilmSettings {
+    fn default() -> Self {
+        Self { width: 640, height: 480, filter: Filter::Box }
+    }
+}
+
+/// How a sample spreads over pixels.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Filter {
+    /// The pixel it falls in.
+    #[default]
+    Box,
+    /// A Gaussian of half a pixel's standard deviation, cut at 1.5 pixels.
+    Gaussian,
+}
 
 /// A sum of samples for every pixel.
 #[derive(Debug)]

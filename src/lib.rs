@@ -34,3 +34,8 @@ pub mod integrator;
 pub mod render;
 
 pub use error::{Error, Result};
+
+/// The example in the README, which the documentation tests run.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

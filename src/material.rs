@@ -92,3 +92,37 @@ impl Material {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::image::Image;
+    use glam::{DVec3, Vec3};
+    use std::f64::consts::FRAC_1_PI;
+    use std::sync::Arc;
+
+    #[test]
+    fn a_map_scales_the_albedo_and_cannot_add_energy() {
+        let image = Image { width: 1, height: 1, pixels: vec![Vec3::new(0.5, 4.0, -1.0)] };
+        let map = Texture::new(Arc::new(image), DVec2::ONE, DVec2::ZERO);
+        let albedo = Spectrum::new(0.8, 0.6, 0.4);
+        let m = Material::new("m", Scattering::Diffuse { albedo, map: Some(map) });
+        let f = m.bsdf(DVec2::splat(0.3)).eval(DVec3::Z, DVec3::Z);
+        assert!((f - Spectrum::new(0.4, 0.6, 0.0) * FRAC_1_PI).length() < 1e-12, "{f}");
+    }
+
+    #[test]
+    fn every_kind_becomes_its_model() {
+        let bsdf = |s: Scattering| Material::new("m", s).bsdf(DVec2::ZERO);
+        let reflectance = Reflectance::Schlick { f0: Spectrum::ONE };
+        let (alpha_x, alpha_y) = (1e-4, 1e-2);
+        assert!(matches!(bsdf(Scattering::Diffuse { albedo: Spectrum::ONE, map: None }), Bsdf::Lambert(_)));
+        let glossy = bsdf(Scattering::Conductor { reflectance, alpha_x, alpha_y }).glossy().unwrap();
+        assert_eq!((glossy.alpha_x, glossy.alpha_y, glossy.eta), (1e-4, 1e-2, None));
+        let glossy = bsdf(Scattering::Dielectric { ior: 1.4, alpha_x, alpha_y }).glossy().unwrap();
+        assert_eq!((glossy.alpha_x, glossy.alpha_y, glossy.eta), (1e-4, 1e-2, Some(1.4)));
+        assert!(bsdf(Scattering::Conductor { reflectance, alpha_x: 0.0, alpha_y: 0.0 }).is_delta());
+        assert!(bsdf(Scattering::Dielectric { ior: 1.4, alpha_x: 0.0, alpha_y: 0.0 }).is_delta());
+        assert!(bsdf(Scattering::Mirror { reflectance: Spectrum::ONE }).is_delta());
+    }
+}

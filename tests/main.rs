@@ -16,4 +16,5 @@ mod agreement;
 mod ray_offset;
 mod visibility;
 mod determinism;
+mod layers;
 mod mis;

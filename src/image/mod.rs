@@ -139,7 +139,7 @@ pub fn write(path: &Path, image: &Image, attributes: &Attributes) -> Result<()> 
     file::replace(path, &bytes.map_err(|message| output(path, message))?)
 }
 
-/// Finds out, before hours of rendering, whether [`write`] could write the file.
+/// Finds out, before hours of rendering, whether [`write()`] could write the file.
 ///
 /// # Errors
 /// [`Error::Output`] with the reason.

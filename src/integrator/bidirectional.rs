@@ -14,7 +14,9 @@ use crate::settings::Settings;
 use crate::subpath::{World, from_light};
 use crate::tally::{Clock, Tally};
 use crate::vertex_bvh::VertexBvh;
+use crate::visibility::Ray;
 use rayon::prelude::*;
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Instant;
 
 /// Light subpaths traced by one task.
@@ -138,13 +140,16 @@ impl<'a> Bidirectional<'a> {
     }
 
     /// The light pass of an iteration: fills the cache, in the order of the subpaths.
-    fn light_pass(&mut self, iteration: u64, film: &Film) -> Tally {
+    fn light_pass(&mut self, iteration: u64, film: &Film, progress: &(dyn Fn(f64) + Sync)) -> Tally {
+        let done = AtomicU64::new(0);
         let parts: Vec<(LightCache, Tally)> = (0..self.light_subpaths.div_ceil(CHUNK))
             .into_par_iter()
             .map(|chunk| {
                 let mut cache = LightCache::default();
                 let range = chunk * CHUNK..((chunk + 1) * CHUNK).min(self.light_subpaths);
                 let tally = self.trace_light(Stream::Light, iteration, range, &mut cache, Some(film));
+                let traced = done.fetch_add(tally.light_subpaths, Ordering::Relaxed) + tally.light_subpaths;
+                progress(traced as f64 / self.light_subpaths as f64);
                 (cache, tally)
             })
             .collect();
@@ -181,12 +186,7 @@ impl<'a> Bidirectional<'a> {
     }
 
     /// Counts a connection's value if its ray is free.
-    fn if_visible(
-        &self,
-        connection: Option<(Spectrum, crate::visibility::Ray)>,
-        clock: Clock,
-        tally: &mut Tally,
-    ) -> Spectrum {
+    fn if_visible(&self, connection: Option<(Spectrum, Ray)>, clock: Clock, tally: &mut Tally) -> Spectrum {
         let Some((value, ray)) = connection else { return Spectrum::ZERO };
         let free = clock.time(&mut tally.visibility, || !self.world.visibility.occluded(&ray));
         if tally.connection(free) { value } else { Spectrum::ZERO }
@@ -253,13 +253,12 @@ impl<'a> Bidirectional<'a> {
 
 impl Integrator for Bidirectional<'_> {
     fn iterate(&mut self, iteration: u64, film: &mut Film, progress: &(dyn Fn(f64) + Sync)) -> Result<Tally> {
-        let mut tally = self.light_pass(iteration, film);
+        let mut tally = self.light_pass(iteration, film, &|fraction| progress(LIGHT_SHARE * fraction));
         if self.recipe.roulette {
             let start = Instant::now();
             self.bvh.build(self.cache.positions())?;
             tally.vertex_bvh_build += start.elapsed().as_secs_f64();
         }
-        progress(LIGHT_SHARE);
         let key = (self.settings.seed, iteration, self.settings.samples);
         let on_eye_side = |fraction| progress(LIGHT_SHARE + (1.0 - LIGHT_SHARE) * fraction);
         tally.add(&tile::sample_film(film, key, &on_eye_side, |sample, clock, tally| {

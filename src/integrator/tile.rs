@@ -10,7 +10,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 const SIDE: u32 = 16;
 /// One tile in this many has its shadow rays and queries timed.
-const TIMED: usize = 8;
+const TIMED: usize = 16;
 
 /// One eye sample: where and with which numbers.
 pub struct Sample {

@@ -1,4 +1,4 @@
-//! The squared ellipsoidal lobe [HRR19], in a form that stays accurate at every roughness (docs/theory.md section 3).
+//! The squared ellipsoidal lobe \[HRR19\], in a form that stays accurate at every roughness (docs/theory.md section 3).
 
 use crate::math::Frame;
 use glam::DVec3;

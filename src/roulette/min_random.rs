@@ -20,7 +20,7 @@ pub enum MinimumRandom {
     /// A node's number is uniform in its stratum [0,1/n); children of equal size get one stratum each.
     #[default]
     Nested,
-    /// The paper's rule: siblings share out the range above the parent's stratum [HRR19].
+    /// The paper's rule: siblings share out the range above the parent's stratum \[HRR19\].
     SemiStratified,
     /// The true minimum of independent uniforms: independent leaves, for comparison.
     Exact,
@@ -29,7 +29,7 @@ pub enum MinimumRandom {
 /// A node's number, in the rules that need more than [`MinimumRandom::Nested`].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Minimum {
-    /// Not above any leaf's number; for a leaf the number itself, in [0,1].
+    /// Not above any leaf's number; for a leaf the number itself, in `[0,1]`.
     pub xi: f64,
     /// Upper end of the stratum that `xi` was drawn from ([`MinimumRandom::SemiStratified`] only).
     pub base: f64,

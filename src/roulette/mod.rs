@@ -1,4 +1,4 @@
-//! Hierarchical Russian roulette [HRR19] on one page: an eye vertex and a tree over light vertices in, accepted light
+//! Hierarchical Russian roulette \[HRR19\] on one page: an eye vertex and a tree over light vertices in, accepted light
 //! vertices and their probabilities out.
 //!
 //! Each light vertex `y` is kept with probability `P = min(1, C q(w) / d^2)`, where `q` ([`Lobe`]s) stands for the

@@ -1,7 +1,7 @@
 //! `[camera]`: from the keys of a file and the bounds of the geometry to a camera.
 
-use super::CameraSettings;
 use super::document::{At, Table};
+use crate::camera::CameraSettings;
 use crate::error::Result;
 use crate::geometry::Mesh;
 use glam::DVec3;

@@ -26,13 +26,12 @@ impl MaterialKeys {
         let name = &entry.key;
         let table = entry.node.table(&format!("[material.{name}]"))?;
         let scattering = table.get("type").map(|kind| scattering(name, table, kind)).transpose()?;
-        if scattering.is_none() {
-            if let Some(e) = table.entries().iter().find(|e| !EMISSION.contains(&e.key.as_str())) {
-                let message =
-                    format!("'{}' in [material.{name}] needs a type beside it: {}", e.key, TYPES.join(", "));
-                let known = EMISSION.into_iter().chain(["type"]);
-                return Err(e.at.error(message + &suggestion(&e.key, known)));
-            }
+        let needs_type = |e: &&Entry| scattering.is_none() && !EMISSION.contains(&e.key.as_str());
+        if let Some(e) = table.entries().iter().find(needs_type) {
+            let message =
+                format!("'{}' in [material.{name}] needs a type beside it: {}", e.key, TYPES.join(", "));
+            let known = EMISSION.into_iter().chain(["type"]);
+            return Err(e.at.error(message + &suggestion(&e.key, known)));
         }
         let what = |key: &str| format!("material.{name}.{key}");
         Ok(Self {

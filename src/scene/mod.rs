@@ -3,12 +3,13 @@
 //! A file is either a TOML scene, which names OBJ files, or a bare OBJ file. Whatever is wrong with one is an error
 //! with its file and line; whatever has to be bent to make sense is a warning with the same.
 
+use crate::camera::CameraSettings;
 use crate::error::{Error, Place, Result};
+use crate::film::FilmSettings;
 use crate::geometry::Mesh;
 use crate::material::Material;
 use crate::settings::Settings;
 use document::{At, Table};
-use glam::DVec3;
 use inputs::Inputs;
 use notes::Notes;
 use obj::Gathering;
@@ -27,63 +28,6 @@ mod obj_scan;
 mod polygon;
 mod settings_file;
 mod textures;
-
-/// A perspective camera as a scene file gives it; world coordinates.
-#[derive(Debug, Clone, PartialEq)]
-pub struct CameraSettings {
-    /// Centre of projection.
-    pub origin: DVec3,
-    /// A point in the middle of the image.
-    pub target: DVec3,
-    /// A direction that appears upward.
-    pub up: DVec3,
-    /// Full vertical angle, degrees.
-    pub fov_y: f64,
-    /// Lens radius, world units; 0 is a pinhole.
-    pub aperture_radius: f64,
-    /// Distance in perfect focus, world units.
-    pub focus_distance: f64,
-}
-
-/// The image as a scene file gives it.
-#[derive(Debug, Clone, PartialEq)]
-pub struct FilmSettings {
-    /// Pixels across.
-    pub width: u32,
-    /// Pixels down.
-    pub height: u32,
-    /// Reconstruction filter.
-    pub filter: Filter,
-}
-
-/// How a sample spreads over pixels.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum Filter {
-    /// The pixel it falls in.
-    #[default]
-    Box,
-    /// A Gaussian of half a pixel's standard deviation, cut at 1.5 pixels.
-    Gaussian,
-}
-
-impl Default for CameraSettings {
-    fn default() -> Self {
-        Self {
-            origin: DVec3::new(0.0, 0.0, 1.0),
-            target: DVec3::ZERO,
-            up: DVec3::Y,
-            fov_y: 40.0,
-            aperture_radius: 0.0,
-            focus_distance: 1.0,
-        }
-    }
-}
-
-impl Default for FilmSettings {
-    fn default() -> Self {
-        Self { width: 640, height: 480, filter: Filter::Box }
-    }
-}
 
 /// Everything that is rendered.
 #[derive(Debug, Clone)]
@@ -139,6 +83,9 @@ impl Scene {
         let mut gathering = Gathering::default();
         if bare {
             gathering.add(path, &mut inputs, &mut notes)?;
+        }
+        if !bare && file.objs.is_empty() {
+            return Err(Error::scene(Place::file(path), "no geometry: obj = [\"scene.obj\"] is missing"));
         }
         let folder = path.parent().unwrap_or(Path::new(""));
         for (name, at) in &file.objs {

@@ -271,3 +271,30 @@ impl Scanner<'_> {
 fn words(rest: &str) -> impl Iterator<Item = &str> {
     rest.split_whitespace().take_while(|word| !word.starts_with('#'))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_plain_form_says_the_same_in_fewer_ways() {
+        let text = "mtllib a.mtl b.mtl\nv 1 2 3 0.1 0.2 0.3\nv 1 \\\n 2 3 # a\nv 0 0 0 1\nvt 0.5\n\
+                    usemtl wood #7\nf 1 2 3\nf 1/1 2/1 3/1\nl 1 2\nusemtl tin\nusemtl wood #7\n\tf  -1 -2 -3\n";
+        let mut notes = Notes::default();
+        let scan = scan(Path::new("a.obj"), text, &mut notes).unwrap();
+        assert_eq!(
+            scan.plain,
+            "v 1 2 3\nv 1 2 3\nv 0 0 0\nvt 0.5 0\nusemtl wood #7\ng\nf 1 2 3\ng\nf 1/1 2/1 3/1\n\
+             usemtl tin\nusemtl wood #7\ng\nf -1 -2 -3\n"
+        );
+        assert_eq!(
+            scan.faces.iter().map(|f| (f.line, f.corners)).collect::<Vec<_>>(),
+            [(8, 3), (9, 3), (13, 3)]
+        );
+        assert_eq!(scan.libraries, [("a.mtl b.mtl".to_owned(), 1)]);
+        // Not tin, which no face uses.
+        assert_eq!(scan.materials, [("wood #7".to_owned(), 8)]);
+        assert_eq!(scan.bare_face, None);
+        assert_eq!(notes.into_warnings().len(), 1);
+    }
+}

@@ -3,8 +3,8 @@
 use super::camera_keys::CameraKeys;
 use super::document::{At, Node, Table};
 use super::material_keys::MaterialKeys;
-use super::{FilmSettings, Filter};
 use crate::error::Result;
+use crate::film::{FilmSettings, Filter};
 use crate::settings::{SettingError, Settings};
 
 const LIGHT_TYPES: [&str; 4] = ["point", "spot", "directional", "environment"];
@@ -89,23 +89,18 @@ fn settings(table: &Table) -> Result<Settings> {
     Ok(settings)
 }
 
-/// Only emitting triangles give light so far.
+/// Only emitting triangles give light so far: the first entry is the error.
 fn refuse_lights(lights: &Node) -> Result<()> {
-    for light in lights.array("[[light]]")? {
-        let table = light.table("[[light]]")?;
-        let Some(kind) = table.get("type") else {
-            return Err(light.at.error(format!("[[light]] needs a type: {}", LIGHT_TYPES.join(", "))));
-        };
-        let name = kind.string("light.type")?;
-        return Err(if LIGHT_TYPES.contains(&name) {
-            kind.at.unsupported(format!("{name} lights; give a material an emission instead"))
-        } else {
-            let hint = super::notes::suggestion(name, LIGHT_TYPES);
-            kind.at.error(format!(
-                "light.type is \"{name}\"; it must be one of {}{hint}",
-                LIGHT_TYPES.join(", ")
-            ))
-        });
+    let Some(light) = lights.array("[[light]]")?.first() else { return Ok(()) };
+    let table = light.table("[[light]]")?;
+    let Some(kind) = table.get("type") else {
+        return Err(light.at.error(format!("[[light]] needs a type: {}", LIGHT_TYPES.join(", "))));
+    };
+    let name = kind.string("light.type")?;
+    if LIGHT_TYPES.contains(&name) {
+        return Err(kind.at.unsupported(format!("{name} lights; give a material an emission instead")));
     }
-    Ok(())
+    let hint = super::notes::suggestion(name, LIGHT_TYPES);
+    let known = LIGHT_TYPES.join(", ");
+    Err(kind.at.error(format!("light.type is \"{name}\"; it must be one of {known}{hint}")))
 }

@@ -31,7 +31,7 @@ impl<'a> World<'a> {
         Ok(Self {
             scene,
             lights: Lights::new(&scene.mesh, &scene.materials),
-            camera: Camera::new(&scene.camera, &scene.film, scene.mesh.origin)?,
+            camera: Camera::new(&scene.camera, (scene.film.width, scene.film.height), scene.mesh.origin)?,
             visibility: visibility::build(settings.visibility, &scene.mesh, settings.threads)?,
         })
     }

@@ -51,7 +51,7 @@ pub trait Visibility: Send + Sync {
 /// Builds a backend's structure over a mesh with up to `threads` threads (0: all). The mesh is copied.
 ///
 /// # Errors
-/// [`Error::Usage`] when the backend is not part of this build, [`Error::Input`] for an invalid mesh, and what the
+/// [`Error::Usage`](crate::Error::Usage) when the backend is not part of this build, [`Error::Input`](crate::Error::Input) for an invalid mesh, and what the
 /// library below reports.
 pub fn build(backend: Backend, mesh: &Mesh, threads: usize) -> Result<Box<dyn Visibility>> {
     match backend {

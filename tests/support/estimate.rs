@@ -64,18 +64,13 @@ impl Estimate {
     /// within `relative`.
     #[track_caller]
     pub fn assert_agrees(&self, other: &Self, relative: f64, names: &str) {
-        let mut family = Family::default();
-        let p = |difference: f64, variance: f64| {
-            if difference == 0.0 { 1.0 } else { z_p(difference / variance.sqrt()) }
-        };
-        for i in 0..self.mean.len() {
-            let what = format!("{names}, block {i}: {} against {}", self.mean[i], other.mean[i]);
-            family.add(what, p(self.mean[i] - other.mean[i], self.variance[i] + other.variance[i]));
-        }
+        let mut family = self.blocks(other, f64::INFINITY, names);
         let variance = self.total_variance + other.total_variance;
         for c in 0..3 {
-            family
-                .add(format!("{names}, mean of channel {c}"), p((self.total - other.total)[c], variance[c]));
+            family.add(
+                format!("{names}, mean of channel {c}"),
+                p_of((self.total - other.total)[c], variance[c]),
+            );
         }
         let ratio = self.total / other.total;
         let noise = variance.map(f64::sqrt) / other.total;
@@ -83,4 +78,29 @@ impl Estimate {
         family.assert();
         assert!((ratio - 1.0).abs().max_element() < relative, "{names}: the means' ratio is {ratio}");
     }
+
+    /// Asserts that both say the same where both are sure: in the blocks whose standard deviations are at most `noise`
+    /// of the mean. Returns how many those are.
+    #[track_caller]
+    pub fn assert_agrees_where_sure(&self, other: &Self, noise: f64, names: &str) -> usize {
+        let family = self.blocks(other, noise, names);
+        println!("{names}: {} of {} blocks are sure to {noise}", family.len(), self.mean.len());
+        family.assert();
+        family.len()
+    }
+
+    fn blocks(&self, other: &Self, noise: f64, names: &str) -> Family {
+        let mut family = Family::default();
+        let sure = |e: &Self, i: usize| e.variance[i].sqrt() <= noise * e.mean[i] || noise == f64::INFINITY;
+        for i in (0..self.mean.len()).filter(|&i| sure(self, i) && sure(other, i)) {
+            let what = format!("{names}, block {i}: {} against {}", self.mean[i], other.mean[i]);
+            family.add(what, p_of(self.mean[i] - other.mean[i], self.variance[i] + other.variance[i]));
+        }
+        family
+    }
+}
+
+/// How likely a difference of means is by chance.
+fn p_of(difference: f64, variance: f64) -> f64 {
+    if difference == 0.0 { 1.0 } else { z_p(difference / variance.sqrt()) }
 }

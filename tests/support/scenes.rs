@@ -2,10 +2,12 @@
 
 use glam::{DVec3, Vec3};
 use hrr::bsdf::Reflectance;
+use hrr::camera::CameraSettings;
+use hrr::film::FilmSettings;
 use hrr::geometry::Mesh;
 use hrr::material::{Material, Scattering};
 use hrr::math::Spectrum;
-use hrr::scene::{CameraSettings, FilmSettings, Scene};
+use hrr::scene::Scene;
 use hrr::settings::Settings;
 use std::path::Path;
 

@@ -22,6 +22,11 @@ impl Family {
         self.tests.push((name.into(), p));
     }
 
+    /// Number of tests.
+    pub fn len(&self) -> usize {
+        self.tests.len()
+    }
+
     /// Fails if any p-value is below what the least of that many would be by chance [Sidak 1967].
     #[track_caller]
     pub fn assert(&self) {
