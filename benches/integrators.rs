@@ -121,8 +121,9 @@ fn caustic(name: &str, seconds: f64, light_subpaths: u64, samples: u32) {
     let reference: Vec<f64> = a.iter().zip(&b).map(|(a, b)| (a + b) / 2.0).collect();
     let noise = mse(&a, &b).map(|d| d / 4.0);
     println!(
-        "{name}: {} pixels of the mirror, {seconds} s each; reference's own MSE {noise:.2e?}",
-        pixels.len()
+        "{name}: {} pixels of the mirror, {seconds} s each; reference's own MSE {:.2e}",
+        pixels.len(),
+        noise[0]
     );
     let errors = |run: &Contender<'_>| {
         let measured = mse(&run.luminances(&pixels), &reference);
