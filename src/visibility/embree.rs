@@ -1,7 +1,7 @@
 //! Intel Embree behind the [`Visibility`] trait.
 //!
 //! Embree's `f32` arithmetic finds candidates; whether one lies within the ray's interval is decided in `f64`
-//! ([`confirm`]). So no ray is stopped by the surface that it leaves or ends at, however thin, distant or large
+//! ([`Triangles::meets`]). So no ray is stopped by the surface that it leaves or ends at, however thin, distant or large
 //! Embree's own rounding makes that surface.
 //!
 //! Embree takes numbers below 1e-18 for 0 and drops triangles beyond 1.8e18. So it is given meshes of size 1 and
@@ -25,10 +25,10 @@ pub struct Embree {
     scale: f32,
     // Released before the triangles that it refers to.
     scene: Scene,
-    _triangles: Box<Triangles>,
+    triangles: Box<Triangles>,
 }
 
-/// What Embree reads, and [`confirm`].
+/// What Embree reads, and what its answers are checked with.
 #[derive(Debug)]
 struct Triangles {
     /// One more than there are: Embree reads 16 bytes at a time.
@@ -58,7 +58,7 @@ impl Embree {
         unsafe { sys::rtcCommitScene(scene.0) };
         // A failed commit leaves an empty scene behind and says so nowhere else.
         device.check("building the acceleration structure")?;
-        Ok(Self { scale, scene, _triangles: triangles })
+        Ok(Self { scale, scene, triangles })
     }
 
     /// A ray as Embree gets it, and what its distances are multiplied with to be the given one's.
@@ -78,7 +78,7 @@ impl Embree {
             time: 0.0,
             tfar: t_max,
             mask: u32::MAX,
-            // Embree overwrites `tfar` with candidates; `confirm` needs the limit that was asked for.
+            // Embree overwrites `tfar` with candidates; `Triangles::meets` needs the limit that was asked for.
             id: t_max.to_bits(),
             flags: 0,
         };
@@ -96,24 +96,32 @@ fn inverse_power(x: f32) -> f32 {
 impl Visibility for Embree {
     #[inline]
     fn intersect(&self, ray: &Ray) -> Option<Hit> {
+        let (scaled, length) = self.scaled(ray);
         // SAFETY: all fields are numbers or nullable pointers.
         let mut query: sys::RTCRayHit = unsafe { mem::zeroed() };
-        let (scaled, length) = self.scaled(ray);
         query.ray = scaled;
         query.hit.geomID = sys::RTC_INVALID_GEOMETRY_ID;
         // SAFETY: likewise; null pointers mean defaults.
         let mut arguments: sys::RTCIntersectArguments = unsafe { mem::zeroed() };
         arguments.flags = sys::RTC_RAY_QUERY_FLAG_INCOHERENT;
         arguments.feature_mask = sys::RTC_FEATURE_FLAG_ALL;
-        // SAFETY: the scene is committed and never changed again, so any thread may ask; `query` and `arguments` have
-        // the layout and alignment of the headers, which the library understands (`Device::new` compares versions).
-        unsafe { sys::rtcIntersect1(self.scene.0, &mut query, &mut arguments) };
-        (query.hit.geomID != sys::RTC_INVALID_GEOMETRY_ID).then_some(Hit {
-            triangle: query.hit.primID,
-            u: query.hit.u,
-            v: query.hit.v,
-            t: query.ray.tfar * length,
-        })
+        loop {
+            // SAFETY: the scene is committed and never changed again, so any thread may ask; `query` and `arguments`
+            // have the layout and alignment of the headers, which the library understands (`Device::new` compares
+            // versions).
+            unsafe { sys::rtcIntersect1(self.scene.0, &mut query, &mut arguments) };
+            if query.hit.geomID == sys::RTC_INVALID_GEOMETRY_ID {
+                return None;
+            }
+            let (triangle, t) = (query.hit.primID, query.ray.tfar);
+            if self.triangles.meets(triangle, &scaled) {
+                return Some(Hit { triangle, u: query.hit.u, v: query.hit.v, t: t * length });
+            }
+            // On to what Embree has seen behind it.
+            query.ray.tnear = t.next_up();
+            query.ray.tfar = scaled.tfar;
+            query.hit.geomID = sys::RTC_INVALID_GEOMETRY_ID;
+        }
     }
 
     #[inline]
@@ -130,9 +138,22 @@ impl Visibility for Embree {
     }
 }
 
-/// Embree's question whether a candidate counts. It does when, seen in double precision, the ray crosses the triangle's
-/// plane within its interval. That it crosses inside the triangle is left to Embree: its answers for neighbours fit
-/// together, with no gap between them.
+impl Triangles {
+    /// Whether, seen in double precision, a ray crosses a triangle's plane within its interval. That it does so inside
+    /// the triangle is left to Embree: its answers for neighbours fit together, with no gap along their edge.
+    #[inline]
+    fn meets(&self, triangle: u32, ray: &sys::RTCRay) -> bool {
+        let [a, b, c] = self.corners[triangle as usize].map(|v| self.positions[v as usize].as_dvec3());
+        let origin = Vec3::new(ray.org_x, ray.org_y, ray.org_z).as_dvec3();
+        let direction = Vec3::new(ray.dir_x, ray.dir_y, ray.dir_z).as_dvec3();
+        let normal = (b - a).cross(c - a);
+        let t = normal.dot(a - origin) / normal.dot(direction);
+        // Also false for the NaN of a triangle without area.
+        f64::from(ray.tnear) < t && t < f64::from(f32::from_bits(ray.id))
+    }
+}
+
+/// Embree's question whether an obstacle that it found for a shadow ray counts.
 ///
 /// # Safety
 /// To be called by Embree only, for a geometry whose user data is a live [`Triangles`].
@@ -147,14 +168,7 @@ unsafe extern "C" fn confirm(arguments: *const sys::RTCFilterFunctionNArguments)
         let hit = arguments.hit.cast::<sys::RTCHit>();
         (arguments.ray.cast::<sys::RTCRay>().read_unaligned(), ptr::addr_of!((*hit).primID).read_unaligned())
     };
-    let [a, b, c] = triangles.corners[triangle as usize].map(|v| triangles.positions[v as usize].as_dvec3());
-    let origin = Vec3::new(ray.org_x, ray.org_y, ray.org_z).as_dvec3();
-    let direction = Vec3::new(ray.dir_x, ray.dir_y, ray.dir_z).as_dvec3();
-    let normal = (b - a).cross(c - a);
-    let t = normal.dot(a - origin) / normal.dot(direction);
-    // Also false for the NaN of a triangle without area.
-    let counts = f64::from(ray.tnear) < t && t < f64::from(f32::from_bits(ray.id));
-    if !counts {
+    if !triangles.meets(triangle, &ray) {
         // SAFETY: one flag for the one ray; 0 rejects.
         unsafe { *arguments.valid = 0 };
     }
@@ -224,7 +238,6 @@ impl Geometry {
         // SAFETY: the geometry is live; `confirm` takes the user data for what it is.
         unsafe {
             sys::rtcSetGeometryUserData(geometry.0, ptr::from_ref(triangles).cast_mut().cast());
-            sys::rtcSetGeometryIntersectFilterFunction(geometry.0, Some(confirm));
             sys::rtcSetGeometryOccludedFilterFunction(geometry.0, Some(confirm));
             sys::rtcCommitGeometry(geometry.0);
         }
