@@ -42,7 +42,8 @@ fn agree_on_cornell(iterations: u64, light_subpaths: u64, relative: f64) {
 
 #[test]
 fn all_integrators_agree_on_cornell() {
-    agree_on_cornell(64, 30_000, 0.015);
+    // Light tracing sees the metal block through rare, bright connections: it takes many until their mean is normal.
+    agree_on_cornell(64, 200_000, 0.015);
 }
 
 /// Some ten minutes: long enough for the noise of the mean to be a tenth of a percent.
