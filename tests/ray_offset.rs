@@ -163,7 +163,7 @@ fn two_planes_that_nearly_touch_are_two() {
             let error = SurfacePoint::at_barycentric(&lower, 0, 0.3, 0.3).error / scale;
             // Twice the shift, for the rounding of the sheets' own corners.
             let both: Vec<DVec3> =
-                [0.0, 4.0 * error].iter().flat_map(|&h| sheet.map(|p| place(p, h))).collect();
+                [0.0, 6.0 * error].iter().flat_map(|&h| sheet.map(|p| place(p, h))).collect();
             let mesh = mesh(&both, &[[0, 1, 2], [3, 4, 5]]);
             for &backend in BACKENDS {
                 let structure = build(backend, &mesh, 1).unwrap();

@@ -12,9 +12,10 @@ use super::Ray;
 use crate::geometry::SurfacePoint;
 use glam::DVec3;
 
-/// Shift in units of [`SurfacePoint::error`]: 0.9 at most for the origin's rounding, and as much again for the
-/// direction's, across all of the triangle.
-const MARGIN: f64 = 2.0;
+/// Shift in units of [`SurfacePoint::error`]: 0.9 at most for the origin's rounding, as much again for the direction's,
+/// across all of the triangle, and as much for the rounding of the corners, which can turn the edge between two nearly
+/// coplanar triangles of a convex body into a concave one.
+const MARGIN: f64 = 3.0;
 
 /// The ray from a surface into a direction, to infinity. `direction` is unit.
 pub fn leave(point: &SurfacePoint, direction: DVec3) -> Ray {
