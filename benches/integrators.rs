@@ -11,7 +11,7 @@ mod workload;
 use hrr::film::Film;
 use hrr::math::luminance;
 use hrr::scene::Scene;
-use hrr::settings::{Integrator, Settings};
+use hrr::settings::{Heuristic, Integrator, Settings};
 use hrr::subpath::World;
 use hrr::visibility::{Hit, Ray, Visibility};
 use std::path::Path;
@@ -69,12 +69,12 @@ impl<'a> Contender<'a> {
     }
 }
 
-/// Mean square difference: of all pixels, and without the worst hundredth of them.
-fn mse(a: &[f64], b: &[f64]) -> [f64; 2] {
+/// Square difference: the mean over all pixels, the mean without the worst hundredth of them, the median.
+fn mse(a: &[f64], b: &[f64]) -> [f64; 3] {
     let mut squares: Vec<f64> = a.iter().zip(b).map(|(a, b)| (a - b) * (a - b)).collect();
     squares.sort_by(f64::total_cmp);
     let mean = |v: &[f64]| v.iter().sum::<f64>() / v.len() as f64;
-    [mean(&squares), mean(&squares[..squares.len() - squares.len() / 100])]
+    [mean(&squares), mean(&squares[..squares.len() - squares.len() / 100]), squares[squares.len() / 2]]
 }
 
 /// The error in the mirror's pixels at equal time: plain picks from the cache, with small and with large iterations,
@@ -86,6 +86,7 @@ fn caustic(name: &str, seconds: f64, light_subpaths: u64, samples: u32) {
         Settings { integrator: Integrator::LvcHrr, light_subpaths, samples, ..scene.settings.clone() };
     let large = Settings { integrator: Integrator::Lvc, ..roulette.clone() };
     let small = Settings { light_subpaths: 0, samples: 1, ..large.clone() };
+    let power = Settings { mis: Heuristic::Power, ..roulette.clone() };
     let seeds = [1, 2].map(|seed| Settings { seed, ..roulette.clone() });
     let world = World::new(&scene, &roulette).expect("a world");
     let camera = &world.camera;
@@ -104,11 +105,12 @@ fn caustic(name: &str, seconds: f64, light_subpaths: u64, samples: u32) {
         Contender::new("lvc", &world, &small),
         Contender::new("lvc", &world, &large),
         Contender::new("lvc+hrr", &world, &roulette),
+        Contender::new("lvc+hrr, power heuristic", &world, &power),
         Contender::new("reference", &world, &seeds[0]),
         Contender::new("reference", &world, &seeds[1]),
     ];
     // References get twice the time each.
-    let share = |i: usize| if i < 3 { 1.0 } else { 2.0 };
+    let share = |i: usize| if i < 4 { 1.0 } else { 2.0 };
     while let Some((_, next)) = runs
         .iter_mut()
         .enumerate()
@@ -117,7 +119,7 @@ fn caustic(name: &str, seconds: f64, light_subpaths: u64, samples: u32) {
     {
         next.iterate();
     }
-    let [a, b] = [3, 4].map(|i| runs[i].luminances(&pixels));
+    let [a, b] = [4, 5].map(|i| runs[i].luminances(&pixels));
     let reference: Vec<f64> = a.iter().zip(&b).map(|(a, b)| (a + b) / 2.0).collect();
     let noise = mse(&a, &b).map(|d| d / 4.0);
     println!(
@@ -127,18 +129,20 @@ fn caustic(name: &str, seconds: f64, light_subpaths: u64, samples: u32) {
     );
     let errors = |run: &Contender<'_>| {
         let measured = mse(&run.luminances(&pixels), &reference);
-        [0, 1].map(|k| measured[k] - noise[k])
+        [0, 1, 2].map(|k| measured[k] - noise[k])
     };
     let ours = errors(&runs[2]);
-    for run in &runs[..3] {
-        let [all, trimmed] = errors(run);
+    for run in &runs[..4] {
+        let [all, trimmed, median] = errors(run);
         println!(
-            "  {:46} {:4} iterations, {:5.1} s: MSE {all:.3e} (x{:.2}), without the worst 1 % {trimmed:.3e} (x{:.2})",
+            "  {:66} {:4} iterations, {:5.1} s: MSE {all:.3e} (x{:.2}), without the worst 1 % {trimmed:.3e} (x{:.2}), \
+             median {median:.3e} (x{:.2})",
             run.name,
             run.iterations,
             run.seconds,
             all / ours[0],
-            trimmed / ours[1]
+            trimmed / ours[1],
+            median / ours[2]
         );
     }
 }

@@ -2,7 +2,7 @@
 
 use crate::bsdf::Transport;
 use crate::math::{Spectrum, luminance};
-use crate::mis::{Side, per_area};
+use crate::mis::{Heuristic, per_area};
 use crate::roulette::{self, Lobe};
 use crate::sampler::{Purpose, Sampler};
 use crate::subpath::walk::{Start, Walk};
@@ -12,8 +12,10 @@ use glam::{DVec2, DVec3};
 
 /// How often each technique tries a path, per eye sample: the m of docs/theory.md section 6. A technique that is off
 /// has 0.
-#[derive(Debug, Clone, Copy, Default)]
+#[derive(Debug, Clone, Copy)]
 pub struct Techniques {
+    /// How they share a path.
+    pub heuristic: Heuristic,
     /// m_0: the eye subpath hits an emitter.
     pub eye_hits: f64,
     /// m_1: next-event estimation, relative to emission, which draws its points from the same density.
@@ -45,6 +47,11 @@ impl Roulette {
 }
 
 impl Techniques {
+    /// All of them off.
+    pub fn none(heuristic: Heuristic) -> Self {
+        Self { heuristic, eye_hits: 0.0, next_event: 0.0, light_image: 0.0, base: 0.0, roulette: None }
+    }
+
     /// The lobe by which the roulette judges light vertices, at a vertex seen from `w_eye`; `None` where it is off.
     pub fn lobe(&self, vertex: &Vertex, w_eye: DVec3) -> Option<Lobe> {
         let limit = self.roulette?.max_alpha;
@@ -88,9 +95,17 @@ impl Techniques {
         }
     }
 
+    /// L_s of a technique whose eye side ends with an edge along `w_eye` at the light vertex; `density`: in which the
+    /// eye side would choose that vertex.
+    fn light_others(&self, light: &Walk, density: f64, w_eye: DVec3) -> f64 {
+        let back = light.vertex.pdf_w(w_eye, light.vertex.wo);
+        let total = self.heuristic.total(&light.side, self.before(light, w_eye), back);
+        self.heuristic.others(density, total)
+    }
+
     /// Goes on along a light subpath.
     pub fn next_light(&self, world: &World<'_>, light: &Walk, sampler: &Sampler) -> Option<Walk> {
-        light.next(world, Transport::Importance, sampler, |wi| self.before(light, wi))
+        light.next(world, self.heuristic, Transport::Importance, sampler, |wi| self.before(light, wi))
     }
 }
 
@@ -120,7 +135,7 @@ impl EyeVertex {
             cos: 1.0,
             total: 0.0,
         };
-        let walk = Walk::follow(world, &start, Spectrum::ONE, 1, false)?;
+        let walk = Walk::follow(world, techniques.heuristic, &start, Spectrum::ONE, 1, false)?;
         Some(Self::new(techniques, walk, techniques.light_image, 0.0))
     }
 
@@ -132,7 +147,8 @@ impl EyeVertex {
 
     /// Goes on to the next eye vertex.
     pub fn next(&self, world: &World<'_>, techniques: &Techniques, sampler: &Sampler) -> Option<Self> {
-        let walk = self.walk.next(world, Transport::Radiance, sampler, |_| self.m_previous)?;
+        let walk =
+            self.walk.next(world, techniques.heuristic, Transport::Radiance, sampler, |_| self.m_previous)?;
         if walk.after_delta {
             return Some(Self::new(techniques, walk, 0.0, 0.0));
         }
@@ -140,9 +156,11 @@ impl EyeVertex {
         Some(Self::new(techniques, walk, m, techniques.next_event))
     }
 
-    /// E_s over the light side's density of this vertex.
-    fn total(&self, w_light: DVec3) -> f64 {
-        self.walk.side.total(self.m_previous, self.walk.vertex.pdf_w(w_light, self.walk.vertex.wo))
+    /// E_s of a technique whose light side ends with an edge along `w_light`; `density`: in which the light side would
+    /// choose this vertex.
+    fn others(&self, heuristic: Heuristic, density: f64, w_light: DVec3) -> f64 {
+        let back = self.walk.vertex.pdf_w(w_light, self.walk.vertex.wo);
+        heuristic.others(density, heuristic.total(&self.walk.side, self.m_previous, back))
     }
 
     /// Radiance that this vertex emits itself, by technique s = 0.
@@ -156,8 +174,10 @@ impl EyeVertex {
         if self.walk.depth == 1 {
             return *throughput * radiance; // no other technique sees emitters directly
         }
-        let e = emitter.pdf_a * side.total(self.m_emitter, emitter.pdf_w(vertex.wo));
-        *throughput * radiance * (techniques.eye_hits / (techniques.eye_hits + e))
+        let heuristic = techniques.heuristic;
+        let total = heuristic.total(side, self.m_emitter, emitter.pdf_w(vertex.wo));
+        let e = heuristic.others(emitter.pdf_a, total);
+        *throughput * radiance * heuristic.weight(0.0, techniques.eye_hits, e)
     }
 
     /// Technique s = 1: light straight from a point of an emitter. The value counts if the ray is free.
@@ -182,11 +202,10 @@ impl EyeVertex {
         if value == Spectrum::ZERO {
             return None;
         }
-        let m = techniques.next_event;
-        let hit = Side { a: 1.0 / emitter.pdf_a, b: 0.0 }.total(techniques.eye_hits, 0.0);
-        let l = per_area(pdf_w, cos_light, edge.distance2) * hit;
-        let e = per_area(emitter.pdf_w(-edge.w), cos, edge.distance2) * self.total(edge.w);
-        let value = value * (m / (emitter.pdf_a * (l + m + e)));
+        let (heuristic, m) = (techniques.heuristic, techniques.next_event);
+        let l = per_area(pdf_w, cos_light, edge.distance2) * techniques.eye_hits / emitter.pdf_a;
+        let e = self.others(heuristic, per_area(emitter.pdf_w(-edge.w), cos, edge.distance2), edge.w);
+        let value = value * (heuristic.weight(heuristic.raise(l), m, e) / emitter.pdf_a);
         Some((value, offset::between(&vertex.point, &emitter.point)))
     }
 
@@ -212,10 +231,11 @@ impl EyeVertex {
         if value == Spectrum::ZERO || !(m > 0.0) {
             return None;
         }
-        let l = per_area(pdf_w, cos_light, edge.distance2)
-            * light.side.total(techniques.before(light, -edge.w), y.pdf_w(-edge.w, y.wo));
-        let e = per_area(y.pdf_w(y.wo, -edge.w), cos, edge.distance2) * self.total(edge.w);
-        let value = value * (m / (tries * (l + m + e)));
+        let heuristic = techniques.heuristic;
+        let l = techniques.light_others(light, per_area(pdf_w, cos_light, edge.distance2), -edge.w);
+        let density = per_area(y.pdf_w(y.wo, -edge.w), cos, edge.distance2);
+        let e = self.others(heuristic, density, edge.w);
+        let value = value * (heuristic.weight(l, m, e) / tries);
         Some((value, offset::between(&eye.point, &y.point)))
     }
 }
@@ -235,9 +255,10 @@ pub fn connect_camera(
     if value == Spectrum::ZERO {
         return None;
     }
-    let l = pdf * light.side.total(techniques.before(light, -edge.w), y.pdf_w(-edge.w, y.wo));
+    let l = techniques.light_others(light, pdf, -edge.w);
+    let m = techniques.light_image;
     let ray = offset::free_to_surface(world.camera.position, &y.point);
-    Some((raster, value / (l + techniques.light_image), ray))
+    Some((raster, value * (techniques.heuristic.weight(l, m, 0.0) / m), ray))
 }
 
 /// The segment from the eye side to the light side.

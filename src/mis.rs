@@ -2,12 +2,15 @@
 //!
 //! A path x_0 (on a light) .. x_{k-1} (the camera) is found by technique s when its first s vertices come from the
 //! light. With fw_i and rv_i the area densities of x_i in the direction of light and of eye, technique s has density
-//! m_s prod_{i<s} fw_i prod_{i>=s} rv_i, where m_s says how often it tries (docs/theory.md section 6). The balance
-//! heuristic's weight of s is m_s / (L_s + m_s + E_s), with the densities of all techniques with fewer (L) and more
-//! (E) light vertices relative to that of s. Both sums are carried along the two subpaths by one recursion
+//! m_s prod_{i<s} fw_i prod_{i>=s} rv_i, where m_s says how often it tries (docs/theory.md section 6). The weight of s is
+//! m_s / (L_s + m_s + E_s), with the densities of all techniques with fewer (L) and more (E) light vertices relative to
+//! that of s, every factor raised to the heuristic's power. Both sums are carried along the two subpaths by one recursion
 //! [VCM-TR, eq. 34-40; there dVCM and dVC].
 
-/// What one subpath knows, at its last vertex x, of the techniques that would have made it from the other end.
+pub use crate::settings::Heuristic;
+
+/// What one subpath knows, at its last vertex x, of the techniques that would have made it from the other end. All in
+/// the power of the [`Heuristic`] that it was made with.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Side {
     /// 1 / (area density of x along this subpath).
@@ -18,25 +21,54 @@ pub struct Side {
     pub b: f64,
 }
 
-impl Side {
-    /// Arrival at a vertex. `pdf_w`: density of the direction taken at the predecessor, 1/sr; `cos`: |cos| at the
-    /// new vertex and at the predecessor, between its geometric normal and the edge; `total`: [`Side::total`] there.
-    pub fn arrive(pdf_w: f64, cos: f64, cos_previous: f64, distance2: f64, total: f64) -> Self {
-        let per_area = pdf_w * cos;
-        Self { a: distance2 / per_area, b: cos_previous * total / per_area }
+impl Heuristic {
+    /// A density, or a product of densities, in the heuristic's power.
+    #[inline]
+    pub fn raise(self, density: f64) -> f64 {
+        match self {
+            Self::Balance => density,
+            Self::Power => density * density,
+        }
     }
 
-    /// The sum of the techniques that split this subpath before or at its last edge, over the area density with which
+    /// Arrival at a vertex. `pdf_w`: density of the direction taken at the predecessor, 1/sr; `cos`: |cos| at the
+    /// new vertex and at the predecessor, between its geometric normal and the edge; `total`:
+    /// [`Heuristic::total`] there.
+    #[inline]
+    pub fn arrive(self, pdf_w: f64, cos: f64, cos_previous: f64, distance2: f64, total: f64) -> Side {
+        let inverse = 1.0 / (pdf_w * cos);
+        // Kept finite: infinity times a density of 0 would be no number.
+        let b = (self.raise(cos_previous * inverse) * total).min(f64::MAX);
+        Side { a: self.raise(distance2 * inverse), b }
+    }
+
+    /// The sum of the techniques that split a subpath before or at its last edge, over the area density with which
     /// the other subpath would choose the vertex: L_s = rv_{s-1} total, E_s = fw_s total.
     ///
     /// `m`: how often the technique that connects the last edge tries; `pdf_w_back`: density of scattering back along
     /// that edge when coming from the successor, 1/sr.
-    pub fn total(&self, m: f64, pdf_w_back: f64) -> f64 {
-        self.a * m + pdf_w_back * self.b
+    #[inline]
+    pub fn total(self, side: &Side, m: f64, pdf_w_back: f64) -> f64 {
+        (side.a * self.raise(m) + self.raise(pdf_w_back) * side.b).min(f64::MAX)
+    }
+
+    /// L or E of a technique, from the area density in which the other subpath would choose the end of a subpath and
+    /// the [`Heuristic::total`] there.
+    #[inline]
+    pub fn others(self, density: f64, total: f64) -> f64 {
+        self.raise(density) * total
+    }
+
+    /// The weight of a technique that tries `m` times, above 0, beside the sums of all others.
+    #[inline]
+    pub fn weight(self, l: f64, m: f64, e: f64) -> f64 {
+        let m = self.raise(m);
+        m / (l + m + e).max(f64::MIN_POSITIVE)
     }
 }
 
 /// The area density of a vertex, given the density of a direction towards it: 1/(world unit)^2.
+#[inline]
 pub fn per_area(pdf_w: f64, cos: f64, distance2: f64) -> f64 {
     pdf_w * cos / distance2
 }

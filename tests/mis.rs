@@ -8,12 +8,14 @@ use hrr::bsdf::Transport;
 use hrr::connect::{EyeVertex, Roulette, Techniques, connect_camera};
 use hrr::light::EmitterPoint;
 use hrr::math::Spectrum;
+use hrr::mis::Heuristic;
 use hrr::sampler::{Purpose, Sampler, Stream};
 use hrr::settings::{Backend, Settings};
 use hrr::subpath::{Vertex, Walk, World, from_light};
 
 /// Numbers with no special relation to each other.
 const TECHNIQUES: Techniques = Techniques {
+    heuristic: Heuristic::Balance,
     eye_hits: 1.0,
     next_event: 1.0,
     light_image: 700.0,
@@ -100,27 +102,31 @@ impl Path {
 
     /// The weight of technique s by definition.
     fn weight(&self, world: &World<'_>, t: &Techniques, s: usize) -> f64 {
-        let d = self.densities(world, t);
+        let exponent = match t.heuristic {
+            Heuristic::Balance => 1.0,
+            Heuristic::Power => 2.0,
+        };
+        let d: Vec<_> = self.densities(world, t).iter().map(|d| d.powf(exponent)).collect();
         d[s] / d.iter().sum::<f64>()
     }
 }
 
-fn light_walks(world: &World<'_>, sampler: &Sampler, length: usize) -> Vec<Walk> {
+fn light_walks(world: &World<'_>, t: &Techniques, sampler: &Sampler, length: usize) -> Vec<Walk> {
     let mut walks = Vec::new();
-    let mut walk = from_light::emit(world, sampler, TECHNIQUES.eye_hits);
+    let mut walk = from_light::emit(world, t.heuristic, sampler, t.eye_hits);
     while let Some(light) = walk.filter(|_| walks.len() < length) {
         walks.push(light);
-        walk = TECHNIQUES.next_light(world, &light, sampler);
+        walk = t.next_light(world, &light, sampler);
     }
     walks
 }
 
-fn eye_walks(world: &World<'_>, sampler: &Sampler, length: usize) -> Vec<EyeVertex> {
+fn eye_walks(world: &World<'_>, t: &Techniques, sampler: &Sampler, length: usize) -> Vec<EyeVertex> {
     let mut walks = Vec::new();
-    let mut eye = EyeVertex::first(world, &TECHNIQUES, sampler.u2(0, Purpose::Raster) * 32.0);
+    let mut eye = EyeVertex::first(world, t, sampler.u2(0, Purpose::Raster) * 32.0);
     while let Some(vertex) = eye.filter(|_| walks.len() < length) {
         walks.push(vertex);
-        eye = vertex.next(world, &TECHNIQUES, sampler);
+        eye = vertex.next(world, t, sampler);
     }
     walks
 }
@@ -132,17 +138,22 @@ fn close(what: &str, by_recursion: f64, by_definition: f64) {
 
 #[test]
 fn recursion_equals_the_definition() {
+    for heuristic in Heuristic::ALL {
+        check(&Techniques { heuristic, ..TECHNIQUES });
+    }
+}
+
+fn check(t: &Techniques) {
     let scene = scenes::box_of_everything();
     let settings = Settings { visibility: Backend::Obvhs, ..Settings::default() };
     let world = World::new(&scene, &settings).unwrap();
-    let t = &TECHNIQUES;
     let mut checked = [0usize; 4];
     let mut with_delta = 0;
     for index in 0..12_000u64 {
         let eye_sampler = Sampler::new(1, 0, Stream::Eye, index);
         let light_sampler = Sampler::new(1, 0, Stream::Light, index);
-        let lights = light_walks(&world, &light_sampler, (index % 5) as usize);
-        let eyes = eye_walks(&world, &eye_sampler, (index / 5 % 5) as usize);
+        let lights = light_walks(&world, t, &light_sampler, (index % 5) as usize);
+        let eyes = eye_walks(&world, t, &eye_sampler, (index / 5 % 5) as usize);
         // The emitter that the light walk started from is drawn by the same numbers again.
         let start = world
             .lights

@@ -50,7 +50,7 @@ impl<'a> Bidirectional<'a> {
             world,
             settings,
             recipe,
-            techniques: Techniques::default(),
+            techniques: Techniques::none(settings.mis),
             light_subpaths,
             cache: LightCache::default(),
             bvh: VertexBvh::new(),
@@ -67,6 +67,7 @@ impl<'a> Bidirectional<'a> {
         let vertices = (n_l * self.vertices_per_subpath()).max(1.0);
         let on = |switch: bool, m: f64| if switch { m } else { 0.0 };
         Techniques {
+            heuristic: self.settings.mis,
             eye_hits: on(recipe.eye_subpaths, 1.0),
             next_event: on(recipe.next_event, 1.0),
             light_image: on(recipe.light_image, n_l / eye_samples),
@@ -116,7 +117,7 @@ impl<'a> Bidirectional<'a> {
         cache.clear();
         for index in subpaths {
             let sampler = Sampler::new(self.settings.seed, iteration, stream, index);
-            let mut walk = from_light::emit(world, &sampler, self.techniques.eye_hits);
+            let mut walk = from_light::emit(world, self.settings.mis, &sampler, self.techniques.eye_hits);
             while let Some(light) = walk.filter(|light| light.depth < self.settings.max_depth) {
                 if !light.vertex.bsdf.is_delta() {
                     if self.keeps_vertices() && light.depth + 2 <= self.settings.max_depth {

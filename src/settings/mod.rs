@@ -1,70 +1,13 @@
 //! The settings of a render as one table: name, kind, default, doc. The `[render]` section of scene files, the flags
 //! of the program and the setters of the C interface are all fed from [`TABLE`].
 
+mod choices;
 mod table;
 
+pub use choices::{Backend, Heuristic, Integrator};
 pub use table::TABLE;
 
 use crate::error::{Error, Place};
-use std::fmt;
-use std::str::FromStr;
-
-/// How light is transported.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub enum Integrator {
-    /// Chosen from what the scene contains.
-    Auto,
-    /// Path tracing with next-event estimation.
-    Pt,
-    /// Light tracing.
-    Lt,
-    /// Bidirectional path tracing, one light subpath for each eye subpath.
-    Bpt,
-    /// Connections to uniform picks from the light-vertex cache.
-    Lvc,
-    /// As `Lvc`, with hierarchical Russian roulette at glossy eye vertices.
-    LvcHrr,
-}
-
-impl Integrator {
-    /// Every integrator, in the order of [`Integrator::NAMES`].
-    pub const ALL: [Self; 6] = [Self::Auto, Self::Pt, Self::Lt, Self::Bpt, Self::Lvc, Self::LvcHrr];
-    /// The names in scene files and flags.
-    pub const NAMES: [&'static str; 6] = ["auto", "pt", "lt", "bpt", "lvc", "lvc+hrr"];
-    /// Names that are reserved for integrators to come.
-    pub const PLANNED: [&'static str; 7] =
-        ["bpt+hrr", "pcbpt", "pcbpt+hrr", "vcm", "vcm+hrr", "pcvcm", "pcvcm+hrr"];
-
-    /// The name in scene files and flags.
-    pub fn name(self) -> &'static str {
-        Self::NAMES[self as usize]
-    }
-}
-
-/// What answers ray queries.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub enum Backend {
-    /// Intel Embree.
-    Embree,
-    /// obvhs, pure Rust.
-    Obvhs,
-    /// Every triangle; for tests.
-    Brute,
-}
-
-impl Backend {
-    /// Every backend, in the order of [`Backend::NAMES`].
-    pub const ALL: [Self; 3] = [Self::Embree, Self::Obvhs, Self::Brute];
-    /// The names in scene files and flags.
-    pub const NAMES: [&'static str; 3] = ["embree", "obvhs", "brute"];
-    /// The fastest backend of this build.
-    pub const BEST: Self = if cfg!(feature = "embree") { Self::Embree } else { Self::Obvhs };
-
-    /// The name in scene files and flags.
-    pub fn name(self) -> &'static str {
-        Self::NAMES[self as usize]
-    }
-}
 
 /// Everything a render can be told; [`TABLE`] gives each field's range and meaning in full.
 #[derive(Debug, Clone, PartialEq)]
@@ -95,6 +38,8 @@ pub struct Settings {
     pub expected: f64,
     /// Largest GGX roughness at which the roulette is used.
     pub hrr_alpha: f64,
+    /// How techniques that find the same path share its weight.
+    pub mis: Heuristic,
 }
 
 impl Default for Settings {
@@ -113,6 +58,7 @@ impl Default for Settings {
             connections: 1,
             expected: 1.0,
             hrr_alpha: 0.3,
+            mis: Heuristic::Balance,
         }
     }
 }
@@ -333,50 +279,12 @@ fn parse_integer(text: &str) -> Option<u64> {
     text.replace('_', "").parse().ok()
 }
 
-impl FromStr for Integrator {
-    type Err = SettingError;
-    fn from_str(name: &str) -> Result<Self, SettingError> {
-        let mut settings = Settings::default();
-        settings.set("integrator", name)?;
-        Ok(settings.integrator)
-    }
-}
-
-impl FromStr for Backend {
-    type Err = SettingError;
-    fn from_str(name: &str) -> Result<Self, SettingError> {
-        let mut settings = Settings::default();
-        settings.set("visibility", name)?;
-        Ok(settings.visibility)
-    }
-}
-
-impl fmt::Display for Integrator {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.pad(self.name())
-    }
-}
-
-impl fmt::Display for Backend {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.pad(self.name())
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
 
     fn message(name: &str, value: &str) -> String {
         Settings::default().set(name, value).unwrap_err().to_string()
-    }
-
-    #[test]
-    fn names_and_variants_are_in_the_same_order() {
-        assert!(Integrator::ALL.iter().enumerate().all(|(i, v)| *v as usize == i));
-        assert!(Backend::ALL.iter().enumerate().all(|(i, v)| *v as usize == i));
-        assert_eq!("lvc+hrr".parse(), Ok(Integrator::LvcHrr));
-        assert_eq!("brute".parse(), Ok(Backend::Brute));
     }
 
     #[test]

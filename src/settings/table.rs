@@ -1,6 +1,6 @@
 //! One row for every setting.
 
-use super::{Backend, Integrator, Kind, Setting};
+use super::{Backend, Heuristic, Integrator, Kind, Setting};
 
 const TRANSPORT: &str = "Light transport";
 const BUDGET: &str = "Budget and randomness";
@@ -98,6 +98,21 @@ pub const TABLE: &[Setting] = &[
         heading: TRANSPORT,
         help: "Largest GGX roughness at which the roulette is used",
         doc: "",
+    },
+    Setting {
+        name: "mis",
+        kind: Kind::Choice {
+            names: &Heuristic::NAMES,
+            planned: &[],
+            get: |s| s.mis as usize,
+            set: |s, i| s.mis = Heuristic::ALL[i],
+        },
+        default: "balance",
+        value_name: "NAME",
+        heading: TRANSPORT,
+        help: "How techniques that find the same path share its weight",
+        doc: "balance: in proportion to their densities. power: to the squares of these, which leaves more to the best \
+              one.",
     },
     Setting {
         name: "iterations",

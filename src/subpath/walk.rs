@@ -3,7 +3,7 @@
 use super::{Vertex, World};
 use crate::bsdf::Transport;
 use crate::math::Spectrum;
-use crate::mis::Side;
+use crate::mis::{Heuristic, Side};
 use crate::sampler::Sampler;
 use crate::visibility::{Ray, offset};
 use glam::DVec3;
@@ -39,7 +39,7 @@ pub struct Start {
     pub pdf_w: f64,
     /// |cos| at the origin.
     pub cos: f64,
-    /// [`Side::total`] at the origin.
+    /// [`Heuristic::total`] at the origin.
     pub total: f64,
 }
 
@@ -47,6 +47,7 @@ impl Walk {
     /// Follows a segment to the surface it meets.
     pub fn follow(
         world: &World<'_>,
+        heuristic: Heuristic,
         start: &Start,
         throughput: Spectrum,
         depth: u32,
@@ -62,7 +63,7 @@ impl Walk {
         Some(Self {
             vertex: Vertex::new(world, point, wo),
             throughput,
-            side: Side::arrive(start.pdf_w, cos, start.cos, distance2, start.total),
+            side: heuristic.arrive(start.pdf_w, cos, start.cos, distance2, start.total),
             distance: distance2.sqrt(),
             depth,
             after_delta,
@@ -74,6 +75,7 @@ impl Walk {
     pub fn next(
         &self,
         world: &World<'_>,
+        heuristic: Heuristic,
         transport: Transport,
         sampler: &Sampler,
         m: impl FnOnce(DVec3) -> f64,
@@ -86,9 +88,9 @@ impl Walk {
             direction: s.wi,
             pdf_w: s.pdf,
             cos: self.vertex.cos_ng(s.wi),
-            total: self.side.total(m, s.pdf_rev),
+            total: heuristic.total(&self.side, m, s.pdf_rev),
         };
-        Self::follow(world, &start, self.throughput * s.weight, self.depth + 1, s.delta)
+        Self::follow(world, heuristic, &start, self.throughput * s.weight, self.depth + 1, s.delta)
     }
 
     /// Offset from the vertex back to the previous one.

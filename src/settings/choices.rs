@@ -1,0 +1,113 @@
+//! Settings that are one of a few names.
+
+use super::{SettingError, Settings};
+use std::fmt;
+use std::str::FromStr;
+
+/// An enumeration with a name for each variant; `$setting` is its row in the table of settings.
+macro_rules! choice {
+    (
+        $(#[$doc:meta])*
+        $name:ident, $setting:literal, $field:ident {
+            $($(#[$variant_doc:meta])* $variant:ident = $text:literal,)*
+        }
+    ) => {
+        $(#[$doc])*
+        #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+        pub enum $name {
+            $($(#[$variant_doc])* $variant,)*
+        }
+
+        impl $name {
+            /// Every variant, in the order of `NAMES`.
+            pub const ALL: [Self; [$($text),*].len()] = [$(Self::$variant),*];
+            /// The names in scene files and flags.
+            pub const NAMES: [&'static str; Self::ALL.len()] = [$($text),*];
+
+            /// The name in scene files and flags.
+            pub fn name(self) -> &'static str {
+                Self::NAMES[self as usize]
+            }
+        }
+
+        impl FromStr for $name {
+            type Err = SettingError;
+            fn from_str(name: &str) -> Result<Self, SettingError> {
+                let mut settings = Settings::default();
+                settings.set($setting, name)?;
+                Ok(settings.$field)
+            }
+        }
+
+        impl fmt::Display for $name {
+            fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                f.pad(self.name())
+            }
+        }
+    };
+}
+
+choice! {
+    /// How light is transported.
+    Integrator, "integrator", integrator {
+        /// Chosen from what the scene contains.
+        Auto = "auto",
+        /// Path tracing with next-event estimation.
+        Pt = "pt",
+        /// Light tracing.
+        Lt = "lt",
+        /// Bidirectional path tracing, one light subpath for each eye subpath.
+        Bpt = "bpt",
+        /// Connections to uniform picks from the light-vertex cache.
+        Lvc = "lvc",
+        /// As `Lvc`, with hierarchical Russian roulette at glossy eye vertices.
+        LvcHrr = "lvc+hrr",
+    }
+}
+
+impl Integrator {
+    /// Names that are reserved for integrators to come.
+    pub const PLANNED: [&'static str; 7] =
+        ["bpt+hrr", "pcbpt", "pcbpt+hrr", "vcm", "vcm+hrr", "pcvcm", "pcvcm+hrr"];
+}
+
+choice! {
+    /// What answers ray queries.
+    Backend, "visibility", visibility {
+        /// Intel Embree.
+        Embree = "embree",
+        /// obvhs, pure Rust.
+        Obvhs = "obvhs",
+        /// Every triangle; for tests.
+        Brute = "brute",
+    }
+}
+
+impl Backend {
+    /// The fastest backend of this build.
+    pub const BEST: Self = if cfg!(feature = "embree") { Self::Embree } else { Self::Obvhs };
+}
+
+choice! {
+    /// How techniques that find the same path share its weight [Veach 1997, section 9.2].
+    Heuristic, "mis", mis {
+        /// In proportion to their densities.
+        Balance = "balance",
+        /// In proportion to the squares of their densities.
+        Power = "power",
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_are_read_back() {
+        assert!(Integrator::ALL.iter().all(|v| v.to_string().parse() == Ok(*v)));
+        assert!(Backend::ALL.iter().all(|v| v.to_string().parse() == Ok(*v)));
+        assert!(Heuristic::ALL.iter().all(|v| v.to_string().parse() == Ok(*v)));
+        assert_eq!("lvc+hrr".parse(), Ok(Integrator::LvcHrr));
+        assert_eq!("brute".parse(), Ok(Backend::Brute));
+    }
+}
