@@ -4,6 +4,9 @@
 //! `cargo bench --bench integrators -- caustic [scene] [seconds] [light subpaths] [samples]`
 //! `cargo bench --bench integrators -- rays`
 
+#[cfg(feature = "embree")]
+#[path = "support/bare_embree.rs"]
+mod bare_embree;
 #[path = "support/workload.rs"]
 #[expect(dead_code, reason = "only its clock is wanted")]
 mod workload;
@@ -164,7 +167,8 @@ impl Visibility for Recorder {
     }
 }
 
-/// The path tracer on `cornell` against its own rays alone, one thread.
+/// The path tracer on `cornell` against its own rays alone, one thread: through the backend, and through nothing but
+/// Embree's own calls.
 fn rays() {
     let scene = load("cornell");
     let settings = Settings { integrator: Integrator::Pt, samples: 4, ..scene.settings.clone() };
@@ -181,36 +185,53 @@ fn rays() {
 
         let world = World::new(&scene, &settings).expect("a world");
         let mut tracer = hrr::integrator::new(&world, &settings);
-        let mut ratios = Vec::new();
+        #[cfg(feature = "embree")]
+        let bare = bare_embree::Bare::new(&scene.mesh);
+        // This thread's processor time, so that other programs on the machine do not count.
+        let seconds = |work: &mut dyn FnMut() -> usize| {
+            const REPEATS: u32 = 5; // the clock may tick in milliseconds
+            let start = cpu_seconds();
+            for _ in 0..REPEATS {
+                assert!(work() > 0);
+            }
+            (cpu_seconds() - start) / f64::from(REPEATS)
+        };
+        let mut ratios = [Vec::new(), Vec::new()];
         for round in 0..9 {
-            // This thread's processor time, so that other programs on the machine do not count.
-            let start = cpu_seconds();
-            tracer.iterate(0, &mut Film::new(&scene.film), &|_| ()).expect("an iteration");
-            let whole = cpu_seconds() - start;
-            let start = cpu_seconds();
-            let hits = rays
-                .iter()
-                .filter(|(ray, shadow)| {
-                    if *shadow {
-                        world.visibility.occluded(ray)
-                    } else {
-                        world.visibility.intersect(ray).is_some()
-                    }
-                })
-                .count();
-            let raw = cpu_seconds() - start;
-            assert!(hits > 0);
+            let whole = seconds(&mut || {
+                tracer.iterate(0, &mut Film::new(&scene.film), &|_| ()).expect("an iteration");
+                1
+            });
+            let backend = seconds(&mut || {
+                let free = |(ray, shadow): &&(Ray, bool)| match shadow {
+                    true => world.visibility.occluded(ray),
+                    false => world.visibility.intersect(ray).is_some(),
+                };
+                rays.iter().filter(free).count()
+            });
             let rate = |s: f64| rays.len() as f64 / s * 1e-6;
-            println!(
-                "  round {round}: {} rays; path tracer {:.2} Mrays/s, rays alone {:.2} Mrays/s, ratio {:.3}",
-                rays.len(),
-                rate(whole),
-                rate(raw),
-                raw / whole
-            );
-            ratios.push(raw / whole);
+            print!("  round {round}: {} rays; Mrays/s: path tracer {:.2}", rays.len(), rate(whole));
+            print!(", backend alone {:.2} (ratio {:.3})", rate(backend), backend / whole);
+            ratios[0].push(backend / whole);
+            #[cfg(feature = "embree")]
+            {
+                let raw = seconds(&mut || {
+                    let hit = |(ray, shadow): &&(Ray, bool)| match shadow {
+                        true => bare.occluded(ray),
+                        false => bare.intersect(ray),
+                    };
+                    rays.iter().filter(hit).count()
+                });
+                print!(", raw Embree calls {:.2} (ratio {:.3})", rate(raw), raw / whole);
+                ratios[1].push(raw / whole);
+            }
+            println!();
         }
-        ratios.sort_by(f64::total_cmp);
-        println!("cornell, {}: median ratio {:.3}", settings.visibility.name(), ratios[ratios.len() / 2]);
+        for (name, mut ratios) in [settings.visibility.name(), "raw Embree calls"].into_iter().zip(ratios) {
+            ratios.sort_by(f64::total_cmp);
+            if let Some(median) = ratios.get(ratios.len() / 2) {
+                println!("cornell: path tracer's rays per second over those of {name}, median {median:.3}");
+            }
+        }
     });
 }

@@ -198,7 +198,7 @@ impl EyeVertex {
         }
         let (cos, cos_light) = (vertex.cos_ng(edge.w), emitter.point.ng.dot(edge.w).abs());
         let (factor, pdf_w) = vertex.toward_light(edge.w);
-        let value = self.walk.throughput * factor * radiance * (cos * cos_light / edge.distance2);
+        let value = self.walk.throughput * factor * radiance * (cos_light / edge.distance2);
         if value == Spectrum::ZERO {
             return None;
         }
@@ -227,7 +227,7 @@ impl EyeVertex {
             * factor
             * y.factor(-edge.w, y.wo)
             * light.throughput
-            * (cos * cos_light / edge.distance2);
+            * (cos_light / edge.distance2);
         if value == Spectrum::ZERO || !(m > 0.0) {
             return None;
         }
@@ -272,6 +272,6 @@ impl Edge {
     fn new(eye: DVec3, light: DVec3) -> Option<Self> {
         let d = light - eye;
         let distance2 = d.length_squared();
-        (distance2 > 0.0).then(|| Self { w: d / distance2.sqrt(), distance2 })
+        (distance2 > 0.0).then(|| Self { w: d * (1.0 / distance2.sqrt()), distance2 })
     }
 }

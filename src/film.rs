@@ -94,6 +94,25 @@ impl Film {
         self.samples += n;
     }
 
+    /// Adds the sum of a pixel's samples, each a raster position and a value, as [`Film::add`] does for one. The sum of
+    /// the samples in one pixel is rounded as a whole: the same samples must come together to give the same bits.
+    pub fn add_samples(&self, x: u32, y: u32, samples: impl Iterator<Item = (DVec2, Spectrum)>) {
+        match self.filter {
+            Filter::Box => {
+                let mut sum = Spectrum::ZERO;
+                for (_, value) in samples {
+                    if value.is_finite() {
+                        sum += value;
+                    } else {
+                        self.dropped.fetch_add(1, Ordering::Relaxed);
+                    }
+                }
+                self.add_pixel(x, y, sum);
+            }
+            Filter::Gaussian => samples.for_each(|(raster, value)| self.add(raster, value)),
+        }
+    }
+
     /// Adds a value at a raster position in [0,width) x [0,height), through the reconstruction filter. From any thread.
     pub fn add(&self, raster: DVec2, value: Spectrum) {
         if value == Spectrum::ZERO {

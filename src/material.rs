@@ -10,8 +10,9 @@ use glam::DVec2;
 pub struct Material {
     /// Name in the MTL file.
     pub name: String,
-    /// How it scatters.
-    pub scattering: Scattering,
+    scattering: Scattering,
+    /// The model made of `scattering`, but for what a texture adds.
+    bsdf: Bsdf,
     /// How far the shading frame is turned about its normal, from the direction of u towards that of v, before
     /// [`Material::bsdf`] is used in it; radians.
     pub tangent_angle: f64,
@@ -66,7 +67,13 @@ impl Material {
     /// A material that emits nothing.
     pub fn new(name: impl Into<String>, scattering: Scattering) -> Self {
         let (emission, two_sided_emission) = (Spectrum::ZERO, false);
-        Self { name: name.into(), scattering, tangent_angle: 0.0, emission, two_sided_emission }
+        let bsdf = scattering.bsdf();
+        Self { name: name.into(), scattering, bsdf, tangent_angle: 0.0, emission, two_sided_emission }
+    }
+
+    /// How it scatters.
+    pub fn scattering(&self) -> &Scattering {
+        &self.scattering
     }
 
     /// Whether it gives light.
@@ -75,20 +82,29 @@ impl Material {
     }
 
     /// The scattering model at texture coordinates `uv`.
+    #[inline(always)]
     pub fn bsdf(&self, uv: DVec2) -> Bsdf {
         match &self.scattering {
-            Scattering::Diffuse { albedo, map: None } => Bsdf::Lambert(Lambert::new(*albedo)),
             Scattering::Diffuse { albedo, map: Some(map) } => {
                 let texel = map.lookup(uv).clamp(Spectrum::ZERO, Spectrum::ONE);
                 Bsdf::Lambert(Lambert::new(*albedo * texel))
             }
-            Scattering::Conductor { reflectance, alpha_x, alpha_y } => {
+            _ => self.bsdf,
+        }
+    }
+}
+
+impl Scattering {
+    fn bsdf(&self) -> Bsdf {
+        match self {
+            Self::Diffuse { albedo, .. } => Bsdf::Lambert(Lambert::new(*albedo)),
+            Self::Conductor { reflectance, alpha_x, alpha_y } => {
                 Bsdf::Conductor(Conductor::new(*reflectance, *alpha_x, *alpha_y))
             }
-            Scattering::Dielectric { ior, alpha_x, alpha_y } => {
+            Self::Dielectric { ior, alpha_x, alpha_y } => {
                 Bsdf::Dielectric(Dielectric::new(*ior, *alpha_x, *alpha_y))
             }
-            Scattering::Mirror { reflectance } => Bsdf::Mirror(Mirror::new(*reflectance)),
+            Self::Mirror { reflectance } => Bsdf::Mirror(Mirror::new(*reflectance)),
         }
     }
 }

@@ -7,7 +7,7 @@ use crate::support::stats::{Family, Moments};
 use glam::{DVec2, DVec3, Vec3};
 use hrr::geometry::{Mesh, SurfacePoint};
 use hrr::light::Lights;
-use hrr::material::{Material, Scattering};
+use hrr::material::Material;
 use hrr::math::{Spectrum, luminance};
 use std::f64::consts::PI;
 
@@ -32,12 +32,10 @@ fn mesh() -> Mesh {
 }
 
 fn materials() -> Vec<Material> {
-    let emitter = |emission, two_sided_emission| Material {
-        name: String::new(),
-        scattering: Scattering::Diffuse { albedo: Spectrum::ZERO, map: None },
-        tangent_angle: 0.0,
-        emission,
-        two_sided_emission,
+    let emitter = |emission, two_sided| {
+        let mut material = Material::diffuse("", Spectrum::ZERO);
+        (material.emission, material.two_sided_emission) = (emission, two_sided);
+        material
     };
     vec![emitter(Spectrum::ZERO, false), emitter(RED, false), emitter(BLUE, true)]
 }

@@ -1,6 +1,6 @@
 //! The settings table, the struct behind it and its TOML are one thing.
 
-use hrr::settings::{Backend, Integrator, Kind, Setting, Settings, TABLE};
+use hrr::settings::{Backend, Heuristic, Integrator, Kind, Setting, Settings, TABLE};
 
 /// A value of each setting that is not its default. A new setting has no entry here yet: the tests say so.
 fn other_value(name: &str) -> &'static str {
@@ -11,6 +11,7 @@ fn other_value(name: &str) -> &'static str {
         "light_subpaths" => "1234",
         "connections" => "3",
         "expected" => "0.25",
+        "mis" => "power",
         "hrr_alpha" => "0.125",
         "iterations" => "9",
         "time" => "30.5",
@@ -47,12 +48,13 @@ fn every_field_has_its_row() {
         connections,
         expected,
         hrr_alpha,
+        mis,
     } = all_changed();
     assert_eq!((integrator, visibility), (Integrator::LvcHrr, Backend::Brute));
     assert_eq!((max_depth, samples, light_subpaths, connections), (7, 2, 1234, 3));
     assert_eq!((iterations, first_iteration, time, seed), (9, 64, Some(30.5), i64::MAX as u64));
-    assert_eq!((threads, expected, hrr_alpha), (2, 0.25, 0.125));
-    assert_eq!(TABLE.len(), 13);
+    assert_eq!((threads, expected, hrr_alpha, mis), (2, 0.25, 0.125, Heuristic::Power));
+    assert_eq!(TABLE.len(), 14);
 }
 
 #[test]

@@ -12,6 +12,7 @@ pub struct Conductor {
     reflectance: Reflectance,
     /// `None` when smooth.
     ggx: Option<Ggx>,
+    survival: f64,
 }
 
 impl Conductor {
@@ -19,7 +20,8 @@ impl Conductor {
     /// [`MIN_ALPHA`](super::ggx::MIN_ALPHA) the metal is a perfect mirror, a delta lobe; when only one is, it is
     /// raised to that.
     pub fn new(reflectance: Reflectance, alpha_x: f64, alpha_y: f64) -> Self {
-        Self { reflectance, ggx: Ggx::new(alpha_x, alpha_y) }
+        let survival = reflectance.mean().max_element().clamp(0.0, 1.0);
+        Self { reflectance, ggx: Ggx::new(alpha_x, alpha_y), survival }
     }
 
     pub(super) fn eval(&self, a: DVec3, b: DVec3) -> Spectrum {
@@ -71,7 +73,7 @@ impl Conductor {
     }
 
     pub(super) fn survival(&self) -> f64 {
-        self.reflectance.mean().max_element().clamp(0.0, 1.0)
+        self.survival
     }
 
     pub(super) fn glossy(&self) -> Option<Glossy> {

@@ -69,6 +69,7 @@ pub enum Bsdf {
 impl Bsdf {
     /// f for light that arrives from `w_light` and leaves to `w_eye`, 1/sr; 0 for delta lobes. In this form radiance
     /// and importance see the same value.
+    #[inline(always)]
     pub fn eval(&self, w_eye: DVec3, w_light: DVec3) -> Spectrum {
         match self {
             Self::Lambert(b) => b.eval(w_eye, w_light),
@@ -79,6 +80,7 @@ impl Bsdf {
     }
 
     /// Density of [`Bsdf::sample`] choosing `wi` given `wo`, 1/sr; without delta lobes.
+    #[inline(always)]
     pub fn pdf(&self, wo: DVec3, wi: DVec3) -> f64 {
         match self {
             Self::Lambert(b) => b.pdf(wo, wi),
@@ -89,6 +91,7 @@ impl Bsdf {
     }
 
     /// Draws a direction; `lobe` and `u` are uniform in [0,1). `None` when the draw fell where nothing scatters.
+    #[inline(always)]
     pub fn sample(&self, wo: DVec3, transport: Transport, lobe: f64, u: DVec2) -> Option<BsdfSample> {
         match self {
             Self::Lambert(b) => b.sample(wo, u),
@@ -99,6 +102,7 @@ impl Bsdf {
     }
 
     /// True when there are only delta lobes, so that connecting to this vertex is pointless.
+    #[inline(always)]
     pub fn is_delta(&self) -> bool {
         match self {
             Self::Lambert(_) => false,
@@ -110,6 +114,7 @@ impl Bsdf {
 
     /// About how much is scattered on, 0..=1: the survival probability of Russian roulette. A property of the point
     /// alone, so that both directions of a path agree on it; 0 only where nothing is ever scattered.
+    #[inline(always)]
     pub fn survival(&self) -> f64 {
         match self {
             Self::Lambert(b) => b.survival(),

@@ -4,4 +4,4 @@ pub mod mesh;
 pub mod surface;
 
 pub use mesh::Mesh;
-pub use surface::SurfacePoint;
+pub use surface::{Shading, SurfacePoint};

@@ -11,7 +11,7 @@ use crate::sampler::{Purpose, Sampler};
 use crate::settings::Settings;
 use crate::subpath::{Vertex, World};
 use crate::tally::{Clock, Tally};
-use crate::visibility::offset;
+use crate::visibility::{Ray, offset};
 
 /// The path tracer.
 pub struct PathTracer<'a> {
@@ -47,44 +47,46 @@ impl<'a> PathTracer<'a> {
                 break;
             }
             let vertex = Vertex::new(world, point, -direction);
-            if !vertex.bsdf.is_delta() {
-                sum += throughput * self.direct(&vertex, &sample.sampler, depth, clock, tally);
+            // Both rays are made before either is traced: the processor then works on them side by side.
+            let scattered = vertex.sample(Transport::Radiance, &sample.sampler, depth);
+            let next = scattered.map(|s| (offset::leave(&point, s.wi), s));
+            let light =
+                if vertex.bsdf.is_delta() { None } else { self.direct(&vertex, &sample.sampler, depth) };
+            if let Some((value, shadow_ray)) = light {
+                let visibility = &world.visibility;
+                let free = clock.time(&mut tally.visibility, || !visibility.occluded(&shadow_ray));
+                if tally.connection(free) {
+                    sum += throughput * value;
+                }
             }
-            let Some(s) = vertex.sample(Transport::Radiance, &sample.sampler, depth) else { break };
+            let Some((next_ray, s)) = next else { break };
             throughput *= s.weight;
             pdf_direction = (!s.delta).then_some(s.pdf);
-            (origin, direction) = (point.position, s.wi);
-            ray = offset::leave(&point, direction);
+            (ray, origin, direction) = (next_ray, point.position, s.wi);
         }
         sum
     }
 
-    /// Light straight from an emitter, weighted against hitting the same point by scattering.
-    fn direct(
-        &self,
-        vertex: &Vertex,
-        sampler: &Sampler,
-        depth: u32,
-        clock: Clock,
-        tally: &mut Tally,
-    ) -> Spectrum {
+    /// Light straight from an emitter, weighted against hitting the same point by scattering; it counts if the ray is
+    /// free.
+    fn direct(&self, vertex: &Vertex, sampler: &Sampler, depth: u32) -> Option<(Spectrum, Ray)> {
         let (pick, u) = (sampler.u1(depth, Purpose::LightPick), sampler.u2(depth, Purpose::LightPoint));
-        let Some(emitter) = self.world.lights.sample_point(pick, u) else { return Spectrum::ZERO };
+        let emitter = self.world.lights.sample_point(pick, u)?;
         let to = emitter.point.position - vertex.point.position;
         let distance2 = to.length_squared();
-        if distance2 == 0.0 {
-            return Spectrum::ZERO;
+        let wi = to * (1.0 / distance2.sqrt());
+        let radiance = emitter.radiance(-wi);
+        if radiance == Spectrum::ZERO || distance2 == 0.0 {
+            return None;
         }
-        let wi = to / distance2.sqrt();
-        let (factor, pdf_w) = vertex.toward_light(wi);
-        let value = factor * vertex.cos_ng(wi) * emitter.radiance(-wi);
-        if value == Spectrum::ZERO {
-            return value;
+        let (scattered, pdf_w) = vertex.toward_light(wi);
+        if scattered == Spectrum::ZERO {
+            return None;
         }
-        let pdf_light = emitter.pdf_a * distance2 / emitter.point.ng.dot(wi).abs();
-        let ray = offset::between(&vertex.point, &emitter.point);
-        let free = clock.time(&mut tally.visibility, || !self.world.visibility.occluded(&ray));
-        if tally.connection(free) { value / (pdf_light + pdf_w) } else { Spectrum::ZERO }
+        // Over the sum of both densities; that of the emitter, seen from here, is pdf_a distance^2 / cos.
+        let cos = emitter.point.ng.dot(wi).abs();
+        let value = scattered * radiance * (cos / (emitter.pdf_a * distance2 + pdf_w * cos));
+        Some((value, offset::between(&vertex.point, &emitter.point)))
     }
 }
 

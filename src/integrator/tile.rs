@@ -43,14 +43,14 @@ pub fn sample_film(
             Clock::sampled(0, 1).time(&mut seconds, || {
                 for y in top..(top + SIDE).min(height) {
                     for x in left..(left + SIDE).min(width) {
-                        for s in 0..samples {
-                            let pixel = u64::from(y) * u64::from(width) + u64::from(x);
-                            let index = pixel * u64::from(samples) + u64::from(s);
+                        let first = (u64::from(y) * u64::from(width) + u64::from(x)) * u64::from(samples);
+                        let values = (first..first + u64::from(samples)).map(|index| {
                             let sampler = Sampler::new(seed, iteration, Stream::Eye, index);
                             let raster = DVec2::new(x.into(), y.into()) + sampler.u2(0, Purpose::Raster);
                             let sample = Sample { raster, index, sampler };
-                            film.add(raster, radiance(&sample, clock, &mut tally));
-                        }
+                            (raster, radiance(&sample, clock, &mut tally))
+                        });
+                        film.add_samples(x, y, values);
                     }
                 }
             });

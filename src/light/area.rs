@@ -21,7 +21,7 @@ pub struct Lights {
 struct Emitter {
     triangle: u32,
     corners: [DVec3; 3],
-    frame: Frame,
+    ng: DVec3,
     error: f64,
     emission: Spectrum,
     two_sided: bool,
@@ -32,7 +32,7 @@ struct Emitter {
 /// A point on an emitter.
 #[derive(Debug, Clone, Copy)]
 pub struct EmitterPoint {
-    /// Where; the shading frame is the face's own.
+    /// Where.
     pub point: SurfacePoint,
     /// Radiance on each emitting side, W/(m^2 sr).
     pub emission: Spectrum,
@@ -64,7 +64,7 @@ impl Lights {
             emitters.push(Emitter {
                 triangle,
                 corners,
-                frame: Frame::from_z(mesh.scaled_normal(triangle).normalize()),
+                ng: mesh.scaled_normal(triangle).normalize(),
                 error: SurfacePoint::error_on(&corners),
                 emission: material.emission,
                 two_sided: material.two_sided_emission,
@@ -89,6 +89,7 @@ impl Lights {
     }
 
     /// A point on some emitter, `None` when there is none. `pick` and `u` are uniform in [0,1).
+    #[inline(always)]
     pub fn sample_point(&self, pick: f64, u: DVec2) -> Option<EmitterPoint> {
         if self.emitters.is_empty() {
             return None;
@@ -99,9 +100,7 @@ impl Lights {
         let position = a * (1.0 - uv.x - uv.y) + b * uv.x + c * uv.y;
         let point = SurfacePoint {
             position,
-            ng: emitter.frame.z,
-            frame: emitter.frame,
-            uv,
+            ng: emitter.ng,
             barycentric: uv,
             triangle: emitter.triangle,
             error: emitter.error,
@@ -110,6 +109,7 @@ impl Lights {
     }
 
     /// The emitter's side of a point that a path has hit, `None` when its triangle does not emit.
+    #[inline(always)]
     pub fn at(&self, point: &SurfacePoint) -> Option<EmitterPoint> {
         match self.of_triangle.get(point.triangle as usize) {
             None | Some(&NOT_EMITTING) => None,
@@ -119,6 +119,7 @@ impl Lights {
 }
 
 impl Emitter {
+    #[inline(always)]
     fn at(&self, point: SurfacePoint) -> EmitterPoint {
         EmitterPoint { point, emission: self.emission, two_sided: self.two_sided, pdf_a: self.pdf_a }
     }

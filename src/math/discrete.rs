@@ -43,6 +43,7 @@ impl Discrete {
     }
 
     /// The index that `u` in [0,1) falls on; never one of weight 0.
+    #[inline(always)]
     pub fn sample(&self, u: f64) -> usize {
         let target = u * self.total;
         let index = self.cdf.partition_point(|&c| c <= target);

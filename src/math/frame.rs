@@ -15,6 +15,7 @@ pub struct Frame {
 
 impl Frame {
     /// Any frame around a unit vector; exact to rounding for every direction [Duff et al. 2017, eq. in listing 3].
+    #[inline(always)]
     pub fn from_z(z: DVec3) -> Self {
         let sign = 1f64.copysign(z.z);
         let a = -1.0 / (sign + z.z);
@@ -27,22 +28,25 @@ impl Frame {
     }
 
     /// The frame around `z` whose x axis is nearest to `tangent`; any frame when `tangent` is zero or parallel to `z`.
+    #[inline(always)]
     pub fn from_z_tangent(z: DVec3, tangent: DVec3) -> Self {
         let t = tangent - z * z.dot(tangent);
         let len2 = t.length_squared();
         if !(len2 > 1e-20 * tangent.length_squared()) {
             return Self::from_z(z);
         }
-        let x = t / len2.sqrt();
+        let x = t * (1.0 / len2.sqrt());
         Self { x, y: z.cross(x), z }
     }
 
     /// World to local.
+    #[inline(always)]
     pub fn to_local(&self, v: DVec3) -> DVec3 {
         DVec3::new(self.x.dot(v), self.y.dot(v), self.z.dot(v))
     }
 
     /// Local to world.
+    #[inline(always)]
     pub fn to_world(&self, v: DVec3) -> DVec3 {
         self.x * v.x + self.y * v.y + self.z * v.z
     }

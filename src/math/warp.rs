@@ -1,30 +1,58 @@
 //! Maps from the unit square to the shapes that are sampled, each with its density.
 
 use glam::{DVec2, DVec3};
-use std::f64::consts::{FRAC_1_PI, FRAC_PI_2, FRAC_PI_4, PI};
+use std::f64::consts::{FRAC_1_PI, FRAC_PI_4, PI};
+use std::hint::select_unpredictable;
 
 /// Uniform on the unit disc, keeping neighbours together [Shirley & Chiu 1997].
+#[inline(always)]
 pub fn square_to_disc(u: DVec2) -> DVec2 {
     let p = u * 2.0 - 1.0;
-    if p == DVec2::ZERO {
-        return p;
+    // The wedge around the nearer axis: radius r, and an angle from it of at most pi/4. No processor guesses which.
+    let wide = p.x.abs() > p.y.abs();
+    let (r, across) = (select_unpredictable(wide, p.x, p.y), select_unpredictable(wide, p.y, p.x));
+    if r == 0.0 {
+        return DVec2::ZERO;
     }
-    let (r, phi) = if p.x.abs() > p.y.abs() {
-        (p.x, FRAC_PI_4 * (p.y / p.x))
-    } else {
-        (p.y, FRAC_PI_2 - FRAC_PI_4 * (p.x / p.y))
-    };
-    let (sin, cos) = phi.sin_cos();
-    DVec2::new(r * cos, r * sin)
+    let (sin, cos) = sin_cos_eighth(across / r);
+    r * DVec2::new(select_unpredictable(wide, cos, sin), select_unpredictable(wide, sin, cos))
+}
+
+/// Sine and cosine of x pi/4 for x in [-1,1], to 4e-16, by Taylor series: the standard library's pair, ready for any
+/// angle, was a twentieth of a path tracer's work.
+#[inline(always)]
+fn sin_cos_eighth(x: f64) -> (f64, f64) {
+    /// 1/1!, -1/3!, 1/5! ...
+    const SIN: [f64; 8] = inverse_factorials(1);
+    /// 1/0!, -1/2!, 1/4! ...
+    const COS: [f64; 9] = inverse_factorials(0);
+    let phi = x * FRAC_PI_4;
+    let sin = SIN.into_iter().rev().fold(0.0, |sum, term| sum * (phi * phi) + term);
+    let cos = COS.into_iter().rev().fold(0.0, |sum, term| sum * (phi * phi) + term);
+    (phi * sin, cos)
+}
+
+/// 1/n!, -1/(n+2)!, 1/(n+4)! ... from n = 0 or 1.
+const fn inverse_factorials<const TERMS: usize>(first: u32) -> [f64; TERMS] {
+    let (mut terms, mut factorial, mut n, mut i) = ([0.0; TERMS], 1.0, first, 0);
+    while i < TERMS {
+        terms[i] = if i % 2 == 0 { 1.0 / factorial } else { -1.0 / factorial };
+        factorial *= ((n + 1) * (n + 2)) as f64;
+        n += 2;
+        i += 1;
+    }
+    terms
 }
 
 /// Cosine-distributed on the hemisphere around +z; density [`cosine_hemisphere_pdf`].
+#[inline(always)]
 pub fn square_to_cosine_hemisphere(u: DVec2) -> DVec3 {
     let d = square_to_disc(u);
     d.extend((1.0 - d.length_squared()).max(0.0).sqrt())
 }
 
 /// Density of [`square_to_cosine_hemisphere`], 1/sr; 0 below the horizon.
+#[inline(always)]
 pub fn cosine_hemisphere_pdf(cos_theta: f64) -> f64 {
     cos_theta.max(0.0) * FRAC_1_PI
 }
@@ -38,7 +66,22 @@ pub fn square_to_sphere(u: DVec2) -> DVec3 {
 }
 
 /// Barycentric coordinates (u, v) of a point uniform in a triangle; weights are (1-u-v, u, v).
+#[inline(always)]
 pub fn square_to_triangle(u: DVec2) -> DVec2 {
     let s = u.x.sqrt();
     DVec2::new(s * (1.0 - u.y), s * u.y)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sines_and_cosines_are_the_standard_librarys() {
+        for i in -1000..=1000 {
+            let x = f64::from(i) / 1000.0;
+            let ((sin, cos), expected) = (sin_cos_eighth(x), (x * FRAC_PI_4).sin_cos());
+            assert!((sin - expected.0).abs() < 4e-16 && (cos - expected.1).abs() < 4e-16, "{x}");
+        }
+    }
 }

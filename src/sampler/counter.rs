@@ -6,7 +6,7 @@
 use glam::DVec2;
 
 /// Mixes 64 bits so that every input bit reaches every output bit [Stafford 2011, variant 13].
-#[inline]
+#[inline(always)]
 pub fn mix(mut x: u64) -> u64 {
     x = (x ^ (x >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
     x = (x ^ (x >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
@@ -14,7 +14,7 @@ pub fn mix(mut x: u64) -> u64 {
 }
 
 /// Combines a key with one more word.
-#[inline]
+#[inline(always)]
 pub fn combine(key: u64, word: u64) -> u64 {
     mix(key ^ word.wrapping_mul(0x9e37_79b9_7f4a_7c15).wrapping_add(0xd1b5_4a32_d192_ed03))
 }
@@ -70,19 +70,19 @@ impl Sampler {
     }
 
     /// 64 random bits for a purpose at a depth (vertex number along the subpath).
-    #[inline]
+    #[inline(always)]
     pub fn bits(&self, depth: u32, purpose: Purpose) -> u64 {
         combine(self.key, (u64::from(depth) << 8) | purpose as u64)
     }
 
     /// Uniform in [0,1), 53 bits.
-    #[inline]
+    #[inline(always)]
     pub fn u1(&self, depth: u32, purpose: Purpose) -> f64 {
         unit(self.bits(depth, purpose))
     }
 
     /// Two independent uniforms in [0,1).
-    #[inline]
+    #[inline(always)]
     pub fn u2(&self, depth: u32, purpose: Purpose) -> DVec2 {
         let a = self.bits(depth, purpose);
         DVec2::new(unit(a), unit(mix(a ^ 0x6a09_e667_f3bc_c908)))

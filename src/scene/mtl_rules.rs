@@ -82,7 +82,9 @@ pub(super) fn material(
 
     let emission = color(v.emissive);
     let tangent_angle = m.number("anisor").unwrap_or(0.0) * TAU;
-    Ok(Material { tangent_angle, emission, ..Material::new(v.name.clone(), scattering) })
+    let mut material = Material::new(v.name.clone(), scattering);
+    (material.tangent_angle, material.emission) = (tangent_angle, emission);
+    Ok(material)
 }
 
 /// A colour brought into 0..=1, with a remark where that changes it.

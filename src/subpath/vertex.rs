@@ -2,7 +2,7 @@
 
 use super::World;
 use crate::bsdf::{Bsdf, Transport};
-use crate::geometry::SurfacePoint;
+use crate::geometry::{Shading, SurfacePoint};
 use crate::math::{Frame, Spectrum};
 use crate::sampler::{Purpose, Sampler};
 use glam::DVec3;
@@ -40,20 +40,21 @@ pub struct Scattered {
 
 impl Vertex {
     /// The vertex at a surface point, reached from the unit direction `wo`.
+    #[inline(always)]
     pub fn new(world: &World<'_>, point: SurfacePoint, wo: DVec3) -> Self {
         let material = &world.scene.materials[world.scene.mesh.materials[point.triangle as usize] as usize];
-        let mut frame = point.frame;
+        let Shading { mut frame, uv } = point.shading(&world.scene.mesh);
         if material.tangent_angle != 0.0 {
             let (sin, cos) = material.tangent_angle.sin_cos();
             let (x, y) = (frame.x, frame.y);
             frame.x = x * cos + y * sin;
             frame.y = y * cos - x * sin;
         }
-        Self { point, wo, bsdf: material.bsdf(point.uv), frame, wo_local: frame.to_local(wo) }
+        Self { point, wo, bsdf: material.bsdf(uv), frame, wo_local: frame.to_local(wo) }
     }
 
     /// |cos| between the geometric normal and a unit direction.
-    #[inline]
+    #[inline(always)]
     pub fn cos_ng(&self, w: DVec3) -> f64 {
         self.point.ng.dot(w).abs()
     }
@@ -70,15 +71,16 @@ impl Vertex {
         self.bsdf.eval(eye, light) * (light.z / cos)
     }
 
-    /// What an eye vertex does with light from the direction `wi`: [`Vertex::factor`] and [`Vertex::pdf_w`] for `wo`.
+    /// What an eye vertex does with light from the direction `wi`: [`Vertex::factor`] times |ng.wi|, that is f |ns.wi|,
+    /// and [`Vertex::pdf_w`] for `wo`.
+    #[inline(always)]
     pub fn toward_light(&self, wi: DVec3) -> (Spectrum, f64) {
         let light = self.frame.to_local(wi);
         let pdf_w = self.bsdf.pdf(self.wo_local, light) * self.bsdf.survival();
-        let cos = self.point.ng.dot(wi);
-        if cos * light.z <= 0.0 || self.point.ng.dot(self.wo) * self.wo_local.z <= 0.0 {
+        if self.point.ng.dot(wi) * light.z <= 0.0 || self.point.ng.dot(self.wo) * self.wo_local.z <= 0.0 {
             return (Spectrum::ZERO, pdf_w);
         }
-        (self.bsdf.eval(self.wo_local, light) * (light.z / cos), pdf_w)
+        (self.bsdf.eval(self.wo_local, light) * light.z.abs(), pdf_w)
     }
 
     /// Density of going on to `to` when coming from `from`, survival included, 1/sr; without delta lobes.
@@ -88,6 +90,7 @@ impl Vertex {
     }
 
     /// Draws a direction to go on in; `depth` keys the random numbers. `None` when the path ends here.
+    #[inline(always)]
     pub fn sample(&self, transport: Transport, sampler: &Sampler, depth: u32) -> Option<Scattered> {
         let survival = self.bsdf.survival();
         if survival < 1.0 && sampler.u1(depth, Purpose::Survival) >= survival {
@@ -95,7 +98,7 @@ impl Vertex {
         }
         let (lobe, u) = (sampler.u1(depth, Purpose::Lobe), sampler.u2(depth, Purpose::Direction));
         let s = self.bsdf.sample(self.wo_local, transport, lobe, u)?;
-        let wi = self.frame.to_world(s.wi).normalize();
+        let wi = self.frame.to_world(s.wi);
         let (cos_o, cos_i) = (self.point.ng.dot(self.wo), self.point.ng.dot(wi));
         if cos_o * self.wo_local.z <= 0.0 || cos_i * s.wi.z <= 0.0 {
             return None;

@@ -38,6 +38,7 @@ impl<'a> World<'a> {
 
     /// The surface point that a ray meets first. `origin` and unit `direction` are the ray in full precision, before
     /// it was moved off its surface and rounded.
+    #[inline(always)]
     pub fn intersect(&self, ray: &Ray, origin: DVec3, direction: DVec3) -> Option<SurfacePoint> {
         let hit = self.visibility.intersect(ray)?;
         let (u, v) = (f64::from(hit.u), f64::from(hit.v));

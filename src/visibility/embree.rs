@@ -5,7 +5,7 @@
 //! Embree's own rounding makes that surface.
 //!
 //! Embree takes numbers below 1e-18 for 0 and drops triangles beyond 1.8e18. So it is given meshes of size 1 and
-//! directions of length 1, up to powers of two, which change no digit of any number.
+//! directions of moderate length, by powers of two, which change no digit of any number.
 
 // One of the crate's two doors to C.
 #![allow(unsafe_code)]
@@ -14,15 +14,16 @@ use super::{Hit, Ray, Visibility};
 use crate::error::{Error, Result};
 use crate::geometry::Mesh;
 use embree4_sys as sys;
-use glam::Vec3;
+use glam::{Vec3, Vec4};
 use std::ffi::{CString, c_void};
 use std::{mem, ptr};
 
 /// A committed Embree scene of one triangle mesh.
 #[derive(Debug)]
 pub struct Embree {
-    /// Embree's coordinates per unit of the mesh's, a power of two.
+    /// Embree's coordinates per unit of the mesh's, a power of two, and the inverse.
     scale: f32,
+    inverse_scale: f32,
     // Released before the triangles that it refers to.
     scene: Scene,
     triangles: Box<Triangles>,
@@ -58,33 +59,63 @@ impl Embree {
         unsafe { sys::rtcCommitScene(scene.0) };
         // A failed commit leaves an empty scene behind and says so nowhere else.
         device.check("building the acceleration structure")?;
-        Ok(Self { scale, scene, triangles })
+        Ok(Self { scale, inverse_scale: 1.0 / scale, scene, triangles })
     }
 
     /// A ray as Embree gets it, and what its distances are multiplied with to be the given one's.
     #[inline]
-    fn scaled(&self, ray: &Ray) -> (sys::RTCRay, f32) {
-        let length = inverse_power(ray.direction.abs().max_element() * self.scale);
-        let (origin, direction) = (ray.origin * self.scale, ray.direction * self.scale * length);
-        let (t_min, t_max) = (ray.t_min / length, ray.t_max / length);
-        let raw = sys::RTCRay {
-            org_x: origin.x,
-            org_y: origin.y,
-            org_z: origin.z,
-            tnear: t_min,
-            dir_x: direction.x,
-            dir_y: direction.y,
-            dir_z: direction.z,
-            time: 0.0,
-            tfar: t_max,
+    fn scaled(&self, ray: &Ray) -> (RawRay, f32) {
+        // Most directions are about unit and can stay as they are: nothing then waits for this to be found out.
+        let size = ray.direction.abs().max_element();
+        let length = if (1e-6..1e6).contains(&size) { 1.0 } else { inverse_power(size) };
+        let (origin, direction) = (ray.origin * self.scale, ray.direction * length);
+        let (to_embree, from_embree) = (self.scale / length, self.inverse_scale * length);
+        let t_max = ray.t_max * to_embree;
+        let raw = RawRay {
+            origin: origin.extend(ray.t_min * to_embree),
+            direction: direction.extend(0.0),
+            t_max,
             mask: u32::MAX,
-            // Embree overwrites `tfar` with candidates; `Triangles::meets` needs the limit that was asked for.
+            // Embree overwrites `t_max` with candidates; `Triangles::meets` needs the limit that was asked for.
             id: t_max.to_bits(),
             flags: 0,
         };
-        (raw, length)
+        (raw, from_embree)
     }
 }
+
+/// Embree's `RTCRay`, with four numbers as one where Embree reads them as one: reading together what was written apart
+/// makes the processor wait.
+#[derive(Debug, Clone, Copy)]
+#[repr(C, align(16))]
+struct RawRay {
+    /// w: nearest distance.
+    origin: Vec4,
+    /// w: time.
+    direction: Vec4,
+    t_max: f32,
+    mask: u32,
+    id: u32,
+    flags: u32,
+}
+
+/// Embree's `RTCRayHit`.
+#[repr(C)]
+struct RawRayHit {
+    ray: RawRay,
+    hit: sys::RTCHit,
+}
+
+const _: () = {
+    assert!(
+        size_of::<RawRay>() == size_of::<sys::RTCRay>() && align_of::<RawRay>() >= align_of::<sys::RTCRay>()
+    );
+    assert!(mem::offset_of!(RawRay, direction) == mem::offset_of!(sys::RTCRay, dir_x));
+    assert!(mem::offset_of!(RawRay, t_max) == mem::offset_of!(sys::RTCRay, tfar));
+    assert!(mem::offset_of!(RawRay, id) == mem::offset_of!(sys::RTCRay, id));
+    assert!(size_of::<RawRayHit>() == size_of::<sys::RTCRayHit>());
+    assert!(mem::offset_of!(RawRayHit, hit) == mem::offset_of!(sys::RTCRayHit, hit));
+};
 
 /// The power of two that takes a positive number into [1,2); the largest for 0.
 #[inline]
@@ -96,30 +127,29 @@ fn inverse_power(x: f32) -> f32 {
 impl Visibility for Embree {
     #[inline]
     fn intersect(&self, ray: &Ray) -> Option<Hit> {
-        let (scaled, length) = self.scaled(ray);
-        // SAFETY: all fields are numbers or nullable pointers.
-        let mut query: sys::RTCRayHit = unsafe { mem::zeroed() };
-        query.ray = scaled;
+        let (scaled, unit) = self.scaled(ray);
+        // SAFETY: all fields are numbers.
+        let mut query = RawRayHit { ray: scaled, hit: unsafe { mem::zeroed() } };
         query.hit.geomID = sys::RTC_INVALID_GEOMETRY_ID;
-        // SAFETY: likewise; null pointers mean defaults.
+        // Embree is slower when it has to make default arguments itself.
+        // SAFETY: all fields are numbers or nullable pointers; null means default.
         let mut arguments: sys::RTCIntersectArguments = unsafe { mem::zeroed() };
         arguments.flags = sys::RTC_RAY_QUERY_FLAG_INCOHERENT;
         arguments.feature_mask = sys::RTC_FEATURE_FLAG_ALL;
         loop {
             // SAFETY: the scene is committed and never changed again, so any thread may ask; `query` and `arguments`
-            // have the layout and alignment of the headers, which the library understands (`Device::new` compares
-            // versions).
-            unsafe { sys::rtcIntersect1(self.scene.0, &mut query, &mut arguments) };
+            // have the layout of the headers, which the library understands (`Device::new` compares versions).
+            unsafe { sys::rtcIntersect1(self.scene.0, (&raw mut query).cast(), &mut arguments) };
             if query.hit.geomID == sys::RTC_INVALID_GEOMETRY_ID {
                 return None;
             }
-            let (triangle, t) = (query.hit.primID, query.ray.tfar);
+            let (triangle, t) = (query.hit.primID, query.ray.t_max);
             if self.triangles.meets(triangle, &scaled) {
-                return Some(Hit { triangle, u: query.hit.u, v: query.hit.v, t: t * length });
+                return Some(Hit { triangle, u: query.hit.u, v: query.hit.v, t: t * unit });
             }
             // On to what Embree has seen behind it.
-            query.ray.tnear = t.next_up();
-            query.ray.tfar = scaled.tfar;
+            query.ray.origin.w = t.next_up();
+            query.ray.t_max = scaled.t_max;
             query.hit.geomID = sys::RTC_INVALID_GEOMETRY_ID;
         }
     }
@@ -132,9 +162,9 @@ impl Visibility for Embree {
         arguments.flags = sys::RTC_RAY_QUERY_FLAG_INCOHERENT;
         arguments.feature_mask = sys::RTC_FEATURE_FLAG_ALL;
         // SAFETY: as in `intersect`.
-        unsafe { sys::rtcOccluded1(self.scene.0, &mut query, &mut arguments) };
+        unsafe { sys::rtcOccluded1(self.scene.0, (&raw mut query).cast(), &mut arguments) };
         // A hit is told by a distance of -inf.
-        query.tfar < 0.0
+        query.t_max < 0.0
     }
 }
 
@@ -142,14 +172,16 @@ impl Triangles {
     /// Whether, seen in double precision, a ray crosses a triangle's plane within its interval. That it does so inside
     /// the triangle is left to Embree: its answers for neighbours fit together, with no gap along their edge.
     #[inline]
-    fn meets(&self, triangle: u32, ray: &sys::RTCRay) -> bool {
+    fn meets(&self, triangle: u32, ray: &RawRay) -> bool {
         let [a, b, c] = self.corners[triangle as usize].map(|v| self.positions[v as usize].as_dvec3());
-        let origin = Vec3::new(ray.org_x, ray.org_y, ray.org_z).as_dvec3();
-        let direction = Vec3::new(ray.dir_x, ray.dir_y, ray.dir_z).as_dvec3();
+        let (origin, direction) = (ray.origin.truncate().as_dvec3(), ray.direction.truncate().as_dvec3());
         let normal = (b - a).cross(c - a);
-        let t = normal.dot(a - origin) / normal.dot(direction);
-        // Also false for the NaN of a triangle without area.
-        f64::from(ray.tnear) < t && t < f64::from(f32::from_bits(ray.id))
+        let (height, speed) = (normal.dot(a - origin), normal.dot(direction));
+        // The distance is height / speed. Both are 0 for a triangle without area, which is not met.
+        let height = height * 1f64.copysign(speed);
+        let speed = speed.abs();
+        let (t_min, t_max) = (f64::from(ray.origin.w), f64::from(f32::from_bits(ray.id)));
+        t_min * speed < height && height < t_max * speed
     }
 }
 
@@ -166,7 +198,7 @@ unsafe extern "C" fn confirm(arguments: *const sys::RTCFilterFunctionNArguments)
     // SAFETY: for one ray the layouts are those of `RTCRay` and `RTCHit`; nothing is assumed of their alignment.
     let (ray, triangle) = unsafe {
         let hit = arguments.hit.cast::<sys::RTCHit>();
-        (arguments.ray.cast::<sys::RTCRay>().read_unaligned(), ptr::addr_of!((*hit).primID).read_unaligned())
+        (arguments.ray.cast::<RawRay>().read_unaligned(), ptr::addr_of!((*hit).primID).read_unaligned())
     };
     if !triangles.meets(triangle, &ray) {
         // SAFETY: one flag for the one ray; 0 rejects.

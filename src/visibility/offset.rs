@@ -18,11 +18,13 @@ use glam::DVec3;
 const MARGIN: f64 = 3.0;
 
 /// The ray from a surface into a direction, to infinity. `direction` is unit.
+#[inline(always)]
 pub fn leave(point: &SurfacePoint, direction: DVec3) -> Ray {
     from_free_point(shifted(point, direction, point.error), direction)
 }
 
 /// The ray between two points on surfaces that is free when they see each other; its hits are the obstacles.
+#[inline(always)]
 pub fn between(a: &SurfacePoint, b: &SurfacePoint) -> Ray {
     let direction = b.position - a.position;
     // The error at an end also grows with the distance to the other.
@@ -32,6 +34,7 @@ pub fn between(a: &SurfacePoint, b: &SurfacePoint) -> Ray {
 
 /// The ray from a point that is on no surface (a camera, a point light) into a direction, to infinity. `p` is relative
 /// to the mesh's origin, `direction` unit.
+#[inline(always)]
 pub fn from_free_point(p: DVec3, direction: DVec3) -> Ray {
     Ray { origin: p.as_vec3(), direction: direction.as_vec3(), t_min: 0.0, t_max: f32::INFINITY }
 }
@@ -43,10 +46,12 @@ pub fn free_to_surface(p: DVec3, b: &SurfacePoint) -> Ray {
 }
 
 /// `point` moved off its surface to the side that `toward` points to.
+#[inline(always)]
 fn shifted(point: &SurfacePoint, toward: DVec3, error: f64) -> DVec3 {
     point.position + point.ng * (MARGIN * error).copysign(point.ng.dot(toward))
 }
 
+#[inline(always)]
 fn segment(from: DVec3, to: DVec3) -> Ray {
     let origin = from.as_vec3();
     // From where the ray starts after rounding, so that rounding does not add up at its end.

@@ -16,7 +16,7 @@ fn material(mtl: &str) -> (hrr::material::Material, Vec<String>) {
 fn scattering(mtl: &str) -> Scattering {
     let (m, warnings) = material(mtl);
     assert_eq!(warnings, [""; 0], "{mtl}");
-    m.scattering
+    m.scattering().clone()
 }
 
 fn diffuse(mtl: &str) -> DVec3 {
@@ -190,12 +190,12 @@ fn textures_are_found_beside_their_mtl_and_follow_their_options() {
     std::fs::create_dir(files.path("sub/pic")).unwrap();
     write_picture(&files.path("sub/pic/four.png"));
     let scene = files.load("s.toml", &[]).unwrap();
-    let Scattering::Diffuse { albedo, map: Some(a) } = &scene.materials[0].scattering else { panic!() };
+    let Scattering::Diffuse { albedo, map: Some(a) } = scene.materials[0].scattering() else { panic!() };
     assert_eq!(*albedo, DVec3::splat(0.5));
     // Shifted by half a picture: the left half shows the right one.
     assert!((a.lookup(DVec2::new(0.25, 0.75)) - DVec3::Y).length() < 1e-6);
     // Without a Kd, the picture counts as it is.
-    let Scattering::Diffuse { albedo, map: Some(b) } = &scene.materials[1].scattering else { panic!() };
+    let Scattering::Diffuse { albedo, map: Some(b) } = scene.materials[1].scattering() else { panic!() };
     assert_eq!(*albedo, DVec3::ONE);
     assert!((b.lookup(DVec2::new(0.25, 0.25)) - DVec3::Z).length() < 1e-6);
     assert_eq!(scene.warnings.len(), 1, "{:?}", scene.warnings); // nothing emits

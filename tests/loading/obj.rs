@@ -155,7 +155,7 @@ fn faces_before_any_material_are_grey() {
     assert_eq!(files.warnings(&scene), ["s.obj:5: faces before any usemtl are made a diffuse grey"]);
     let grey = &scene.materials[scene.mesh.materials[0] as usize];
     assert!(
-        matches!(grey.scattering, Scattering::Diffuse { albedo, map: None } if albedo == DVec3::splat(0.5))
+        matches!(*grey.scattering(), Scattering::Diffuse { albedo, map: None } if albedo == DVec3::splat(0.5))
     );
     assert!(scene.materials[scene.mesh.materials[1] as usize].emits());
 }

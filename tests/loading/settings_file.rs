@@ -26,7 +26,7 @@ fn every_key_arrives() {
     let m = &scene.materials[0];
     assert_eq!((m.emission, m.two_sided_emission), (DVec3::new(1.0, 2.0, 3.0), true));
     let Scattering::Conductor { reflectance: Reflectance::Complex { eta, k }, alpha_x, alpha_y } =
-        m.scattering
+        *m.scattering()
     else {
         panic!("{m:?}")
     };
@@ -41,7 +41,7 @@ fn every_material_type() {
         let files = toml_scene(&format!("{OBJ_LINE}[material.lamp]\n{keys}\nemission = 2\n"));
         let scene = files.load("s.toml", &[]).unwrap();
         assert_eq!(scene.materials[0].emission, DVec3::splat(2.0));
-        scene.materials[0].scattering.clone()
+        scene.materials[0].scattering().clone()
     };
     assert!(matches!(load("type = \"diffuse\"\nalbedo = [0.1, 0.2, 0.3]"),
         Scattering::Diffuse { albedo, map: None } if albedo == DVec3::new(0.1, 0.2, 0.3)));
@@ -215,7 +215,7 @@ fn flags_win_over_the_file() {
     // Of iterations and time, the one given last counts.
     assert_eq!((scene.settings.iterations, scene.settings.time), (7, None));
     assert_eq!(scene.settings.integrator, Integrator::LvcHrr);
-    assert!(matches!(scene.materials[0].scattering,
+    assert!(matches!(*scene.materials[0].scattering(),
         Scattering::Mirror { reflectance } if reflectance == DVec3::new(0.5, 0.25, 1.0)));
     // A bare OBJ file takes them, too.
     let scene = files.load("s.obj", &[("film.height", "20")]).unwrap();
