@@ -26,6 +26,24 @@ pub struct Techniques {
     pub base: f64,
     /// m_s / P where the roulette is on.
     pub roulette: Option<Roulette>,
+    /// How light vertices are merged with eye vertices.
+    pub merging: Option<Merging>,
+}
+
+/// Vertex merging: light vertices near an eye vertex count as if they were it.
+#[derive(Debug, Clone, Copy)]
+pub struct Merging {
+    /// n_L, the number of light subpaths emitted.
+    pub light_subpaths: f64,
+    /// How near, world units.
+    pub radius: f64,
+}
+
+impl Merging {
+    /// eta = n_L pi r^2: how many light subpaths end in an eye vertex's disc, per unit of their density.
+    pub fn eta(&self) -> f64 {
+        self.light_subpaths * std::f64::consts::PI * self.radius * self.radius
+    }
 }
 
 /// Where and how hard the roulette plays.
@@ -49,7 +67,15 @@ impl Roulette {
 impl Techniques {
     /// All of them off.
     pub fn none(heuristic: Heuristic) -> Self {
-        Self { heuristic, eye_hits: 0.0, next_event: 0.0, light_image: 0.0, base: 0.0, roulette: None }
+        Self {
+            heuristic,
+            eye_hits: 0.0,
+            next_event: 0.0,
+            light_image: 0.0,
+            base: 0.0,
+            roulette: None,
+            merging: None,
+        }
     }
 
     /// The lobe by which the roulette judges light vertices, at a vertex seen from `w_eye`; `None` where it is off.
@@ -95,17 +121,28 @@ impl Techniques {
         }
     }
 
+    /// eta at vertices that are not delta; 0 without merging.
+    pub fn eta(&self) -> f64 {
+        self.merging.map_or(0.0, |merging| merging.eta())
+    }
+
     /// L_s of a technique whose eye side ends with an edge along `w_eye` at the light vertex; `density`: in which the
     /// eye side would choose that vertex.
     fn light_others(&self, light: &Walk, density: f64, w_eye: DVec3) -> f64 {
+        self.heuristic.others(density, self.light_total(light, w_eye))
+    }
+
+    /// The sum over the light side's techniques up to a light vertex from which the path goes on along `w_eye`.
+    fn light_total(&self, light: &Walk, w_eye: DVec3) -> f64 {
         let back = light.vertex.pdf_w(w_eye, light.vertex.wo);
-        let total = self.heuristic.total(&light.side, self.before(light, w_eye), back);
-        self.heuristic.others(density, total)
+        self.heuristic.total(&light.side, self.before(light, w_eye), back, self.eta())
     }
 
     /// Goes on along a light subpath.
     pub fn next_light(&self, world: &World<'_>, light: &Walk, sampler: &Sampler) -> Option<Walk> {
-        light.next(world, self.heuristic, Transport::Importance, sampler, |wi| self.before(light, wi))
+        light.next(world, self.heuristic, Transport::Importance, sampler, self.eta(), |wi| {
+            self.before(light, wi)
+        })
     }
 }
 
@@ -147,8 +184,14 @@ impl EyeVertex {
 
     /// Goes on to the next eye vertex.
     pub fn next(&self, world: &World<'_>, techniques: &Techniques, sampler: &Sampler) -> Option<Self> {
-        let walk =
-            self.walk.next(world, techniques.heuristic, Transport::Radiance, sampler, |_| self.m_previous)?;
+        let walk = self.walk.next(
+            world,
+            techniques.heuristic,
+            Transport::Radiance,
+            sampler,
+            techniques.eta(),
+            |_| self.m_previous,
+        )?;
         if walk.after_delta {
             return Some(Self::new(techniques, walk, 0.0, 0.0));
         }
@@ -158,9 +201,14 @@ impl EyeVertex {
 
     /// E_s of a technique whose light side ends with an edge along `w_light`; `density`: in which the light side would
     /// choose this vertex.
-    fn others(&self, heuristic: Heuristic, density: f64, w_light: DVec3) -> f64 {
+    fn others(&self, techniques: &Techniques, density: f64, w_light: DVec3) -> f64 {
+        techniques.heuristic.others(density, self.total(techniques, w_light))
+    }
+
+    /// The sum over the eye side's techniques up to this vertex, when the path goes on along `w_light`.
+    fn total(&self, techniques: &Techniques, w_light: DVec3) -> f64 {
         let back = self.walk.vertex.pdf_w(w_light, self.walk.vertex.wo);
-        heuristic.others(density, heuristic.total(&self.walk.side, self.m_previous, back))
+        techniques.heuristic.total(&self.walk.side, self.m_previous, back, techniques.eta())
     }
 
     /// Radiance that this vertex emits itself, by technique s = 0.
@@ -175,7 +223,7 @@ impl EyeVertex {
             return *throughput * radiance; // no other technique sees emitters directly
         }
         let heuristic = techniques.heuristic;
-        let total = heuristic.total(side, self.m_emitter, emitter.pdf_w(vertex.wo));
+        let total = heuristic.total(side, self.m_emitter, emitter.pdf_w(vertex.wo), 0.0);
         let e = heuristic.others(emitter.pdf_a, total);
         *throughput * radiance * heuristic.weight(0.0, techniques.eye_hits, e)
     }
@@ -204,7 +252,7 @@ impl EyeVertex {
         }
         let (heuristic, m) = (techniques.heuristic, techniques.next_event);
         let l = per_area(pdf_w, cos_light, edge.distance2) * techniques.eye_hits / emitter.pdf_a;
-        let e = self.others(heuristic, per_area(emitter.pdf_w(-edge.w), cos, edge.distance2), edge.w);
+        let e = self.others(techniques, per_area(emitter.pdf_w(-edge.w), cos, edge.distance2), edge.w);
         let value = value * (heuristic.weight(heuristic.raise(l), m, e) / emitter.pdf_a);
         Some((value, offset::between(&vertex.point, &emitter.point)))
     }
@@ -234,9 +282,22 @@ impl EyeVertex {
         let heuristic = techniques.heuristic;
         let l = techniques.light_others(light, per_area(pdf_w, cos_light, edge.distance2), -edge.w);
         let density = per_area(y.pdf_w(y.wo, -edge.w), cos, edge.distance2);
-        let e = self.others(heuristic, density, edge.w);
+        let e = self.others(techniques, density, edge.w);
         let value = value * (heuristic.weight(l, m, e) / tries);
         Some((value, offset::between(&eye.point, &y.point)))
+    }
+
+    /// Merging with a light vertex within the radius: the light that arrives there counts as arriving here.
+    pub fn merge(&self, techniques: &Techniques, merging: &Merging, light: &Walk) -> Spectrum {
+        let vertex = &self.walk.vertex;
+        let value = self.walk.throughput * vertex.factor(vertex.wo, light.vertex.wo) * light.throughput;
+        if value == Spectrum::ZERO {
+            return value;
+        }
+        let eta = merging.eta();
+        let light_total = techniques.light_total(light, vertex.wo);
+        let eye_total = self.total(techniques, light.vertex.wo);
+        value * (techniques.heuristic.merging_weight(light_total, eta, eye_total) / eta)
     }
 }
 

@@ -4,8 +4,9 @@
 //! light. With fw_i and rv_i the area densities of x_i in the direction of light and of eye, technique s has density
 //! m_s prod_{i<s} fw_i prod_{i>=s} rv_i, where m_s says how often it tries (docs/theory.md section 6). The weight of s is
 //! m_s / (L_s + m_s + E_s), with the densities of all techniques with fewer (L) and more (E) light vertices relative to
-//! that of s, every factor raised to the heuristic's power. Both sums are carried along the two subpaths by one recursion
-//! [VCM-TR, eq. 34-40; there dVCM and dVC].
+//! that of s, every factor raised to the heuristic's power. Merging both subpaths at x_i is a technique of density
+//! eta fw_i times that of technique i. Both sums are carried along the two subpaths by one recursion [VCM-TR, eq. 34-40;
+//! there dVCM, dVC and dVM, which is part of b here].
 
 pub use crate::settings::Heuristic;
 
@@ -42,14 +43,16 @@ impl Heuristic {
         Side { a: self.raise(distance2 * inverse), b }
     }
 
-    /// The sum of the techniques that split a subpath before or at its last edge, over the area density with which
-    /// the other subpath would choose the vertex: L_s = rv_{s-1} total, E_s = fw_s total.
+    /// The sum of the techniques that split a subpath before or at its last edge, and of those that merge before or at
+    /// its last vertex, over the area density with which the other subpath would choose the vertex:
+    /// L_s = rv_{s-1} total, E_s = fw_s total.
     ///
     /// `m`: how often the technique that connects the last edge tries; `pdf_w_back`: density of scattering back along
-    /// that edge when coming from the successor, 1/sr.
+    /// that edge when coming from the successor, 1/sr; `merging`: eta, how many vertices of other subpaths are merged
+    /// with this one, per unit of their density; 0 where none are.
     #[inline]
-    pub fn total(self, side: &Side, m: f64, pdf_w_back: f64) -> f64 {
-        (side.a * self.raise(m) + self.raise(pdf_w_back) * side.b).min(f64::MAX)
+    pub fn total(self, side: &Side, m: f64, pdf_w_back: f64, merging: f64) -> f64 {
+        (side.a * self.raise(m) + self.raise(merging) + self.raise(pdf_w_back) * side.b).min(f64::MAX)
     }
 
     /// L or E of a technique, from the area density in which the other subpath would choose the end of a subpath and
@@ -57,6 +60,14 @@ impl Heuristic {
     #[inline]
     pub fn others(self, density: f64, total: f64) -> f64 {
         self.raise(density) * total
+    }
+
+    /// The weight of merging two subpaths at a vertex with the [`Heuristic::total`]s `light` and `eye`, which both
+    /// count it.
+    #[inline]
+    pub fn merging_weight(self, light: f64, merging: f64, eye: f64) -> f64 {
+        let m = self.raise(merging);
+        m / (light + (eye - m).max(0.0)).max(f64::MIN_POSITIVE)
     }
 
     /// The weight of a technique that tries `m` times, above 0, beside the sums of all others.

@@ -18,6 +18,8 @@ pub struct Tally {
     pub connection_rays: u64,
     /// Those of them that met nothing.
     pub visible_connections: u64,
+    /// Light vertices merged with eye vertices.
+    pub merged: u64,
     /// Seconds tracing light subpaths, their connections to the camera included.
     pub light_trace: f64,
     /// Seconds building the vertex BVH.
@@ -41,6 +43,7 @@ impl Tally {
         self.roulette.add(&other.roulette);
         self.connection_rays += other.connection_rays;
         self.visible_connections += other.visible_connections;
+        self.merged += other.merged;
         self.light_trace += other.light_trace;
         self.vertex_bvh_build += other.vertex_bvh_build;
         self.eye_trace += other.eye_trace;

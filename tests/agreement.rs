@@ -63,6 +63,25 @@ fn all_integrators_agree_on_every_material() {
     }
 }
 
+/// Merging blurs by its radius, here a hundredth of the room's: less than the noise.
+#[test]
+fn vertex_merging_agrees_on_every_material() {
+    let scene = scenes::box_of_everything();
+    let pt = run(&scene, Integrator::Pt, 1, 64, 16);
+    for (seed, integrator) in [Integrator::Vcm, Integrator::VcmHrr].into_iter().enumerate() {
+        let settings = Settings {
+            integrator,
+            seed: 2 + seed as u64,
+            iterations: 64,
+            samples: 8,
+            merge_radius: 0.01,
+            max_depth: 8,
+            ..Settings::default()
+        };
+        estimate(&scene, &settings, 8).assert_agrees(&pt, 0.02, integrator.name());
+    }
+}
+
 /// The demo, with a mirror that is rough enough for plain connections to converge, and as it is.
 #[test]
 fn the_roulette_agrees_on_the_caustic_mirror() {

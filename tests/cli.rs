@@ -177,10 +177,10 @@ fn what_is_to_come_is_exit_code_5() {
     assert_eq!(code, 5);
     assert!(err.starts_with("hrr: --integrator: not supported: "), "{err}");
 
-    fs::write(place.path("vcm.toml"), SCENE.replace("\"pt\"", "\"vcm\"")).unwrap();
-    let (code, _, err) = place.run("render vcm.toml -o a.exr");
+    fs::write(place.path("pcvcm.toml"), SCENE.replace("\"pt\"", "\"pcvcm\"")).unwrap();
+    let (code, _, err) = place.run("render pcvcm.toml -o a.exr");
     assert_eq!(code, 5);
-    assert!(err.starts_with("hrr: vcm.toml:11: not supported: "), "{err}");
+    assert!(err.starts_with("hrr: pcvcm.toml:11: not supported: "), "{err}");
 }
 
 #[test]

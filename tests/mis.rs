@@ -5,13 +5,15 @@
 use crate::support::scenes;
 use glam::{DVec2, DVec3};
 use hrr::bsdf::Transport;
-use hrr::connect::{EyeVertex, Roulette, Techniques, connect_camera};
+use hrr::connect::{EyeVertex, Merging, Roulette, Techniques, connect_camera};
 use hrr::light::EmitterPoint;
 use hrr::math::Spectrum;
 use hrr::mis::Heuristic;
 use hrr::sampler::{Purpose, Sampler, Stream};
 use hrr::settings::{Backend, Settings};
+use hrr::subpath::walk::Start;
 use hrr::subpath::{Vertex, Walk, World, from_light};
+use hrr::visibility::offset;
 
 /// Numbers with no special relation to each other.
 const TECHNIQUES: Techniques = Techniques {
@@ -21,6 +23,7 @@ const TECHNIQUES: Techniques = Techniques {
     light_image: 700.0,
     base: 1.7,
     roulette: Some(Roulette { light_subpaths: 1400.0, constant: 0.02, max_alpha: 0.3 }),
+    merging: Some(Merging { light_subpaths: 1400.0, radius: 0.01 }),
 };
 
 /// A whole path: a point on an emitter, surface vertices from the light's side, the camera.
@@ -65,8 +68,8 @@ impl Path {
             .map_or(0.0, |s| s.pdf * vertex.bsdf.survival())
     }
 
-    /// Densities of all techniques s = 0 .. k-1, up to a common factor.
-    fn densities(&self, world: &World<'_>, t: &Techniques) -> Vec<f64> {
+    /// Densities, up to a common factor, of all techniques s = 0 .. k-1, and of merging at x_0 .. x_{k-1}.
+    fn densities(&self, world: &World<'_>, t: &Techniques) -> [Vec<f64>; 2] {
         let k = self.surfaces.len() + 2;
         let delta = |i: usize| i >= 1 && i <= k - 2 && self.surfaces[i - 1].bsdf.is_delta();
         let fw = |i: usize| match i {
@@ -97,17 +100,20 @@ impl Path {
             let offset = self.position(world, s - 1) - self.position(world, s);
             t.connection(lobe.as_ref(), offset)
         };
-        (0..k).map(|s| m(s) * (0..s).map(fw).product::<f64>() * (s..k - 1).map(rv).product::<f64>()).collect()
+        let b = |s: usize| (0..s).map(fw).product::<f64>() * (s..k - 1).map(rv).product::<f64>();
+        let eta = t.merging.map_or(0.0, |m| m.light_subpaths * std::f64::consts::PI * m.radius * m.radius);
+        let merging = |i: usize| if i == 0 || i > k - 2 || delta(i) { 0.0 } else { eta * b(i) * fw(i) };
+        [(0..k).map(|s| m(s) * b(s)).collect(), (0..k).map(merging).collect()]
     }
 
-    /// The weight of technique s by definition.
-    fn weight(&self, world: &World<'_>, t: &Techniques, s: usize) -> f64 {
+    /// The weight of connecting with s light vertices (`kind` 0), or of merging at x_s (`kind` 1), by definition.
+    fn weight(&self, world: &World<'_>, t: &Techniques, kind: usize, s: usize) -> f64 {
         let exponent = match t.heuristic {
             Heuristic::Balance => 1.0,
             Heuristic::Power => 2.0,
         };
-        let d: Vec<_> = self.densities(world, t).iter().map(|d| d.powf(exponent)).collect();
-        d[s] / d.iter().sum::<f64>()
+        let d = self.densities(world, t).map(|d| d.into_iter().map(|d| d.powf(exponent)).collect::<Vec<_>>());
+        d[kind][s] / d.iter().flatten().sum::<f64>()
     }
 }
 
@@ -131,6 +137,25 @@ fn eye_walks(world: &World<'_>, t: &Techniques, sampler: &Sampler, length: usize
     walks
 }
 
+/// The light walk's next vertex, were it `end`; `None` where it cannot get there.
+fn led_to(world: &World<'_>, t: &Techniques, light: &Walk, end: &Vertex) -> Option<Walk> {
+    let y = &light.vertex;
+    let direction = (end.point.position - y.point.position).normalize();
+    let m = t.before(light, direction);
+    let pdf_w = y.pdf_w(y.wo, direction);
+    let start = Start {
+        ray: offset::leave(&y.point, direction),
+        origin: y.point.position,
+        direction,
+        pdf_w,
+        cos: y.cos_ng(direction),
+        total: t.heuristic.total(&light.side, m, y.pdf_w(direction, y.wo), t.eta()),
+    };
+    let throughput = light.throughput * y.factor(direction, y.wo) * (start.cos / pdf_w);
+    Walk::follow(world, t.heuristic, &start, throughput, light.depth + 1, false)
+        .filter(|w| pdf_w > 0.0 && (w.vertex.point.position - end.point.position).length() < 1e-9)
+}
+
 fn close(what: &str, by_recursion: f64, by_definition: f64) {
     let error = (by_recursion - by_definition).abs();
     assert!(error < 1e-9 * by_definition.abs() + 1e-12, "{what}: {by_recursion} is not {by_definition}");
@@ -147,7 +172,7 @@ fn check(t: &Techniques) {
     let scene = scenes::box_of_everything();
     let settings = Settings { visibility: Backend::Obvhs, ..Settings::default() };
     let world = World::new(&scene, &settings).unwrap();
-    let mut checked = [0usize; 4];
+    let mut checked = [0usize; 5];
     let mut with_delta = 0;
     for index in 0..12_000u64 {
         let eye_sampler = Sampler::new(1, 0, Stream::Eye, index);
@@ -179,7 +204,7 @@ fn check(t: &Techniques) {
                 if radiance != Spectrum::ZERO && !before.is_empty() {
                     let path = path(emitter, &[], before);
                     let got = last.emitted(&world, t).x / (last.walk.throughput.x * radiance.x);
-                    close("s = 0", got, path.weight(&world, t, 0));
+                    close("s = 0", got, path.weight(&world, t, 0, 0));
                     count(0, &path);
                 }
             }
@@ -201,7 +226,7 @@ fn check(t: &Techniques) {
                     * x.factor(x.wo, w)
                     * emitter.radiance(-w)
                     * (x.cos_ng(w) * path.g(&world, 1, 0) / emitter.pdf_a);
-                close("s = 1", value.x / plain.x, path.weight(&world, t, 1));
+                close("s = 1", value.x / plain.x, path.weight(&world, t, 0, 1));
                 count(1, &path);
             }
         }
@@ -222,8 +247,24 @@ fn check(t: &Techniques) {
                     * y.factor(-w, y.wo)
                     * light.throughput
                     * (z.cos_ng(w) * y.cos_ng(w) / offset.length_squared());
-                close("connection", value.x / plain.x, path.weight(&world, t, s));
+                close("connection", value.x / plain.x, path.weight(&world, t, 0, s));
                 count(2, &path);
+            }
+        }
+        if let (Some(last), Some(eye)) = (lights.last(), eyes.last())
+            && !last.vertex.bsdf.is_delta()
+            && !eye.walk.vertex.bsdf.is_delta()
+            && let Some(light) = led_to(&world, t, last, &eye.walk.vertex)
+        {
+            // Merging where the eye walk ends, with a light walk that is led there.
+            let path = path(start, &lights, &eyes);
+            let (y, z) = (&light.vertex, &eye.walk.vertex);
+            let merging = t.merging.as_ref().unwrap();
+            let value = eye.merge(t, merging, &light);
+            let plain = eye.walk.throughput * z.factor(z.wo, y.wo) * light.throughput / merging.eta();
+            if plain.x > 0.0 {
+                close("merging", value.x / plain.x, path.weight(&world, t, 1, lights.len() + 1));
+                count(4, &path);
             }
         }
         if let Some(light) = lights.last().filter(|w| !w.vertex.bsdf.is_delta())
@@ -237,7 +278,7 @@ fn check(t: &Techniques) {
             let plain = light.throughput
                 * y.factor(w, y.wo)
                 * (path.g(&world, k - 1, k - 2) * world.camera.pdf_w(-w));
-            close("s = k-1", value.x / plain.x * t.light_image, path.weight(&world, t, k - 1));
+            close("s = k-1", value.x / plain.x * t.light_image, path.weight(&world, t, 0, k - 1));
             count(3, &path);
         }
     }

@@ -12,6 +12,9 @@ fn other_value(name: &str) -> &'static str {
         "connections" => "3",
         "expected" => "0.25",
         "mis" => "power",
+        "merge_radius" => "0.5",
+        "merge_pixels" => "5.0",
+        "merge_shrink" => "1.0",
         "hrr_alpha" => "0.125",
         "iterations" => "9",
         "time" => "30.5",
@@ -49,12 +52,16 @@ fn every_field_has_its_row() {
         expected,
         hrr_alpha,
         mis,
+        merge_radius,
+        merge_pixels,
+        merge_shrink,
     } = all_changed();
     assert_eq!((integrator, visibility), (Integrator::LvcHrr, Backend::Brute));
     assert_eq!((max_depth, samples, light_subpaths, connections), (7, 2, 1234, 3));
     assert_eq!((iterations, first_iteration, time, seed), (9, 64, Some(30.5), i64::MAX as u64));
     assert_eq!((threads, expected, hrr_alpha, mis), (2, 0.25, 0.125, Heuristic::Power));
-    assert_eq!(TABLE.len(), 14);
+    assert_eq!((merge_radius, merge_pixels, merge_shrink), (0.5, 5.0, 1.0));
+    assert_eq!(TABLE.len(), 17);
 }
 
 #[test]

@@ -1,6 +1,6 @@
 //! The tree over light vertices, as its callers see it.
 
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 use hrr::sampler::counter::{mix, unit};
 use hrr::vertex_bvh::{Block, NodeId, VertexBvh};
 use proptest::prelude::*;
@@ -89,4 +89,33 @@ proptest! {
         again.build(&p).unwrap();
         prop_assert_eq!(contents(&again), found);
     }
+}
+
+#[test]
+fn a_ball_holds_what_testing_every_vertex_finds() {
+    let mut bvh = VertexBvh::new();
+    let mut found_in_all = 0;
+    for (n, scale, shift) in
+        [(1, 1.0, 0.0), (9, 1.0, 0.0), (700, 1e-4, 1.0), (20_000, 1.0, 50.0), (5000, 1e6, -3e5)]
+    {
+        let points: Vec<Vec3> =
+            points(n, 5).iter().map(|p| (p.as_dvec3() * scale + shift).as_vec3()).collect();
+        bvh.build(&points).unwrap();
+        for i in 0..200u64 {
+            let u = |k: u64| unit(mix(mix(i ^ 99) ^ k));
+            let near = points[(u(1) * n as f64) as usize].as_dvec3();
+            let radius = scale * 10f64.powf(-5.0 * u(2));
+            let center = near + (DVec3::new(u(3), u(4), u(5)) - 0.5) * radius;
+            let mut found = Vec::new();
+            bvh.within(center, radius, &mut |index| found.push(index));
+            found.sort_unstable();
+            let expected: Vec<u32> = (0..n as u32)
+                .filter(|&k| (points[k as usize].as_dvec3() - center).length_squared() <= radius * radius)
+                .collect();
+            assert_eq!(found, expected, "{n} vertices, radius {radius}");
+            found_in_all += found.len();
+        }
+    }
+    assert!(found_in_all > 1000, "{found_in_all}");
+    VertexBvh::new().within(DVec3::ZERO, 1.0, &mut |_| panic!("an empty tree"));
 }

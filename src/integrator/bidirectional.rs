@@ -1,9 +1,10 @@
 //! The bidirectional machine: light pass, vertex BVH, eye pass. What it does in each is a [`Recipe`].
 
 use super::Integrator;
+use super::merging;
 use super::recipe::{Base, Recipe};
 use super::tile::{self, Sample};
-use crate::connect::{self, EyeVertex, Roulette, Techniques};
+use crate::connect::{self, EyeVertex, Merging, Roulette, Techniques};
 use crate::error::Result;
 use crate::film::Film;
 use crate::light_cache::LightCache;
@@ -33,6 +34,8 @@ pub struct Bidirectional<'a> {
     recipe: Recipe,
     techniques: Techniques,
     light_subpaths: u64,
+    /// Radius of merging in the first iteration, world units.
+    first_radius: f64,
     cache: LightCache,
     bvh: VertexBvh,
 }
@@ -52,6 +55,7 @@ impl<'a> Bidirectional<'a> {
             recipe,
             techniques: Techniques::none(settings.mis),
             light_subpaths,
+            first_radius: if recipe.merging { merging::first_radius(world, settings) } else { 0.0 },
             cache: LightCache::default(),
             bvh: VertexBvh::new(),
         };
@@ -76,6 +80,8 @@ impl<'a> Bidirectional<'a> {
                 Base::OwnPath => 1.0,
                 Base::Uniform => f64::from(self.settings.connections) * n_l / vertices,
             },
+            // Of each iteration its own.
+            merging: None,
             roulette: recipe.roulette.then(|| Roulette {
                 light_subpaths: n_l,
                 constant: self.settings.expected * self.world.scene.mesh.total_area() / vertices,
@@ -100,7 +106,7 @@ impl<'a> Bidirectional<'a> {
     }
 
     fn keeps_vertices(&self) -> bool {
-        self.recipe.base != Base::Off || self.recipe.roulette
+        self.recipe.base != Base::Off || self.recipe.roulette || self.recipe.merging
     }
 
     /// Traces light subpaths, storing their vertices and connecting them to the camera.
@@ -113,6 +119,8 @@ impl<'a> Bidirectional<'a> {
         film: Option<&Film>,
     ) -> Tally {
         let (world, start) = (self.world, Instant::now());
+        // A path has one segment more when it is connected than when it is merged.
+        let more = if self.recipe.merging { 1 } else { 2 };
         let mut tally = Tally { light_subpaths: subpaths.end - subpaths.start, ..Tally::default() };
         cache.clear();
         for index in subpaths {
@@ -120,7 +128,7 @@ impl<'a> Bidirectional<'a> {
             let mut walk = from_light::emit(world, self.settings.mis, &sampler, self.techniques.eye_hits);
             while let Some(light) = walk.filter(|light| light.depth < self.settings.max_depth) {
                 if !light.vertex.bsdf.is_delta() {
-                    if self.keeps_vertices() && light.depth + 2 <= self.settings.max_depth {
+                    if self.keeps_vertices() && light.depth + more <= self.settings.max_depth {
                         cache.push(&light);
                     }
                     if let Some(film) = film.filter(|_| self.recipe.light_image)
@@ -180,6 +188,7 @@ impl<'a> Bidirectional<'a> {
                 } else {
                     self.connect_base(&vertex, sample, clock, tally)
                 };
+                sum += self.merge(&vertex, tally);
             }
             eye = vertex.next(world, techniques, &sample.sampler);
         }
@@ -220,6 +229,21 @@ impl<'a> Bidirectional<'a> {
         sum
     }
 
+    /// Merging with all light vertices within the radius.
+    fn merge(&self, vertex: &EyeVertex, tally: &mut Tally) -> Spectrum {
+        let Some(merging) = &self.techniques.merging else { return Spectrum::ZERO };
+        let (depth, position) = (vertex.walk.depth, vertex.walk.vertex.point.position);
+        let mut sum = Spectrum::ZERO;
+        self.bvh.within(position, merging.radius, &mut |index| {
+            if depth + self.cache.depth(index as usize) <= self.settings.max_depth {
+                let light = self.cache.load(self.world, index as usize);
+                sum += vertex.merge(&self.techniques, merging, &light);
+                tally.merged += 1;
+            }
+        });
+        sum
+    }
+
     /// Connections to what the roulette keeps of all light vertices.
     fn play_roulette(
         &self,
@@ -254,8 +278,12 @@ impl<'a> Bidirectional<'a> {
 
 impl Integrator for Bidirectional<'_> {
     fn iterate(&mut self, iteration: u64, film: &mut Film, progress: &(dyn Fn(f64) + Sync)) -> Result<Tally> {
+        self.techniques.merging = (self.first_radius > 0.0).then(|| Merging {
+            light_subpaths: self.light_subpaths as f64,
+            radius: merging::radius(self.first_radius, self.settings.merge_shrink, iteration),
+        });
         let mut tally = self.light_pass(iteration, film, &|fraction| progress(LIGHT_SHARE * fraction));
-        if self.recipe.roulette {
+        if self.recipe.roulette || self.recipe.merging {
             let start = Instant::now();
             self.bvh.build(self.cache.positions())?;
             tally.vertex_bvh_build += start.elapsed().as_secs_f64();

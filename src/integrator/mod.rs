@@ -4,6 +4,7 @@
 pub mod recipe;
 pub mod path;
 pub mod bidirectional;
+mod merging;
 mod tile;
 
 pub use recipe::Recipe;

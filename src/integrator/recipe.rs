@@ -26,6 +26,8 @@ pub struct Recipe {
     pub base: Base,
     /// Hierarchical Russian roulette over all light vertices at glossy eye vertices.
     pub roulette: bool,
+    /// Light vertices near an eye vertex count as if they were it.
+    pub merging: bool,
 }
 
 impl Recipe {
@@ -37,6 +39,7 @@ impl Recipe {
             light_image: true,
             base: Base::Uniform,
             roulette: false,
+            merging: false,
         };
         match integrator {
             Integrator::Pt => None,
@@ -44,6 +47,8 @@ impl Recipe {
             Integrator::Bpt => Some(Self { base: Base::OwnPath, ..all }),
             Integrator::Lvc => Some(all),
             Integrator::LvcHrr | Integrator::Auto => Some(Self { roulette: true, ..all }),
+            Integrator::Vcm => Some(Self { merging: true, ..all }),
+            Integrator::VcmHrr => Some(Self { merging: true, roulette: true, ..all }),
         }
     }
 }

@@ -62,13 +62,16 @@ choice! {
         Lvc = "lvc",
         /// As `Lvc`, with hierarchical Russian roulette at glossy eye vertices.
         LvcHrr = "lvc+hrr",
+        /// As `Lvc`, with vertex merging as well.
+        Vcm = "vcm",
+        /// As `Vcm`, with hierarchical Russian roulette at glossy eye vertices.
+        VcmHrr = "vcm+hrr",
     }
 }
 
 impl Integrator {
     /// Names that are reserved for integrators to come.
-    pub const PLANNED: [&'static str; 7] =
-        ["bpt+hrr", "pcbpt", "pcbpt+hrr", "vcm", "vcm+hrr", "pcvcm", "pcvcm+hrr"];
+    pub const PLANNED: [&'static str; 5] = ["bpt+hrr", "pcbpt", "pcbpt+hrr", "pcvcm", "pcvcm+hrr"];
 }
 
 choice! {

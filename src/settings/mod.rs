@@ -40,6 +40,12 @@ pub struct Settings {
     pub hrr_alpha: f64,
     /// How techniques that find the same path share its weight.
     pub mis: Heuristic,
+    /// Radius of vertex merging in the first iteration, world units; 0 = by `merge_pixels`.
+    pub merge_radius: f64,
+    /// The same in pixels, at the median distance of what the camera sees.
+    pub merge_pixels: f64,
+    /// How fast the radius shrinks: r_i = r_0 (i + 1)^((this - 1) / 2).
+    pub merge_shrink: f64,
 }
 
 impl Default for Settings {
@@ -59,6 +65,9 @@ impl Default for Settings {
             expected: 1.0,
             hrr_alpha: 0.3,
             mis: Heuristic::Balance,
+            merge_radius: 0.0,
+            merge_pixels: 1.0,
+            merge_shrink: 0.75,
         }
     }
 }
@@ -334,7 +343,7 @@ mod tests {
     #[test]
     fn a_refused_value_changes_nothing() {
         let mut s = Settings::default();
-        for (name, value) in [("max_depth", "x"), ("integrator", "vcm"), ("time", "-1"), ("nope", "1")] {
+        for (name, value) in [("max_depth", "x"), ("integrator", "pcvcm"), ("time", "-1"), ("nope", "1")] {
             s.set(name, value).unwrap_err();
         }
         assert_eq!(s, Settings::default());

@@ -21,8 +21,9 @@ pub const TABLE: &[Setting] = &[
         heading: TRANSPORT,
         help: "How light is transported",
         doc: "pt: path tracing with next-event estimation. lt: light tracing. bpt: bidirectional path tracing. \
-              lvc: eye subpaths connected to uniform picks from a cache of light vertices. lvc+hrr: as lvc, with \
-              hierarchical Russian roulette at glossy eye vertices. auto: chosen from what the scene contains.",
+              lvc: eye subpaths connected to uniform picks from a cache of light vertices. vcm: as lvc, with \
+              vertex merging as well, whose blur shrinks from iteration to iteration. +hrr: with hierarchical \
+              Russian roulette at glossy eye vertices. auto: chosen from what the scene contains.",
     },
     Setting {
         name: "max_depth",
@@ -113,6 +114,49 @@ pub const TABLE: &[Setting] = &[
         help: "How techniques that find the same path share its weight",
         doc: "balance: in proportion to their densities. power: to the squares of these, which leaves more to the best \
               one.",
+    },
+    Setting {
+        name: "merge_radius",
+        kind: Kind::Real {
+            min: 0.0,
+            max: 1e30,
+            get: |s| Some(s.merge_radius),
+            set: |s, v| s.merge_radius = v,
+        },
+        default: "0.0",
+        value_name: "LENGTH",
+        heading: TRANSPORT,
+        help: "Radius of vertex merging (vcm) in the first iteration, world units; 0: by merge_pixels",
+        doc: "",
+    },
+    Setting {
+        name: "merge_pixels",
+        kind: Kind::Real {
+            min: 1e-3,
+            max: 1e3,
+            get: |s| Some(s.merge_pixels),
+            set: |s, v| s.merge_pixels = v,
+        },
+        default: "1.0",
+        value_name: "PIXELS",
+        heading: TRANSPORT,
+        help: "Radius of vertex merging (vcm) in the first iteration, in pixels",
+        doc: "A pixel is as large as at the median distance of what the camera sees.",
+    },
+    Setting {
+        name: "merge_shrink",
+        kind: Kind::Real {
+            min: 0.0,
+            max: 1.0,
+            get: |s| Some(s.merge_shrink),
+            set: |s, v| s.merge_shrink = v,
+        },
+        default: "0.75",
+        value_name: "ALPHA",
+        heading: TRANSPORT,
+        help: "How slowly the radius of vertex merging shrinks; 1: not at all",
+        doc: "Iteration i has the first one's radius times (i + 1)^((ALPHA - 1) / 2). The image converges to the right \
+              one for values under 1; with 1 it stays blurred.",
     },
     Setting {
         name: "iterations",

@@ -71,24 +71,26 @@ impl Walk {
     }
 
     /// Scatters at the vertex and goes on to the next. `m` tells how often the technique that would connect the edge
-    /// to the previous vertex tries, given the direction in which the path leaves; it is not asked at delta lobes.
+    /// to the previous vertex tries, given the direction in which the path leaves; neither it nor `merging`
+    /// ([`Heuristic::total`]) counts at delta lobes.
     pub fn next(
         &self,
         world: &World<'_>,
         heuristic: Heuristic,
         transport: Transport,
         sampler: &Sampler,
+        merging: f64,
         m: impl FnOnce(DVec3) -> f64,
     ) -> Option<Self> {
         let s = self.vertex.sample(transport, sampler, self.depth)?;
-        let m = if s.delta { 0.0 } else { m(s.wi) };
+        let (m, merging) = if s.delta { (0.0, 0.0) } else { (m(s.wi), merging) };
         let start = Start {
             ray: offset::leave(&self.vertex.point, s.wi),
             origin: self.vertex.point.position,
             direction: s.wi,
             pdf_w: s.pdf,
             cos: self.vertex.cos_ng(s.wi),
-            total: heuristic.total(&self.side, m, s.pdf_rev),
+            total: heuristic.total(&self.side, m, s.pdf_rev, merging),
         };
         Self::follow(world, heuristic, &start, self.throughput * s.weight, self.depth + 1, s.delta)
     }

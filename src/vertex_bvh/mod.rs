@@ -6,6 +6,7 @@
 //! [`Block`]s of eight vertices. A tree over n vertices takes 16 n bytes for positions and indices and 3.4 n for
 //! boxes.
 
+mod ball;
 mod build;
 mod kd;
 
