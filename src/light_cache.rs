@@ -87,6 +87,12 @@ impl LightCache {
         self.starts[index] as usize..self.starts[index + 1] as usize
     }
 
+    /// Number of vertices in the first `subpaths` subpaths.
+    pub fn end_of(&self, subpaths: u64) -> usize {
+        let last = (self.starts.len() - 1).min(usize::try_from(subpaths).unwrap_or(usize::MAX));
+        self.starts[last] as usize
+    }
+
     /// Segments between a vertex and its light.
     pub fn depth(&self, index: usize) -> u32 {
         self.records[index].depth

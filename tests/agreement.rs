@@ -58,7 +58,9 @@ fn all_integrators_agree_on_every_material() {
     let scene = scenes::box_of_everything();
     let pt = run(&scene, Integrator::Pt, 1, 64, 16);
     // Light tracing is left out: it sees no mirrors and no glass.
-    for (seed, integrator) in [Integrator::Bpt, Integrator::Lvc, Integrator::LvcHrr].into_iter().enumerate() {
+    let others =
+        [Integrator::Bpt, Integrator::Lvc, Integrator::LvcHrr, Integrator::Pcbpt, Integrator::PcbptHrr];
+    for (seed, integrator) in others.into_iter().enumerate() {
         run(&scene, integrator, 2 + seed as u64, 64, 8).assert_agrees(&pt, 0.02, integrator.name());
     }
 }
@@ -68,7 +70,9 @@ fn all_integrators_agree_on_every_material() {
 fn vertex_merging_agrees_on_every_material() {
     let scene = scenes::box_of_everything();
     let pt = run(&scene, Integrator::Pt, 1, 64, 16);
-    for (seed, integrator) in [Integrator::Vcm, Integrator::VcmHrr].into_iter().enumerate() {
+    for (seed, integrator) in
+        [Integrator::Vcm, Integrator::VcmHrr, Integrator::PcvcmHrr].into_iter().enumerate()
+    {
         let settings = Settings {
             integrator,
             seed: 2 + seed as u64,

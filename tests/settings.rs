@@ -12,6 +12,8 @@ fn other_value(name: &str) -> &'static str {
         "connections" => "3",
         "expected" => "0.25",
         "mis" => "power",
+        "reused_subpaths" => "50",
+        "record_spacing" => "4",
         "merge_radius" => "0.5",
         "merge_pixels" => "5.0",
         "merge_shrink" => "1.0",
@@ -52,6 +54,8 @@ fn every_field_has_its_row() {
         expected,
         hrr_alpha,
         mis,
+        reused_subpaths,
+        record_spacing,
         merge_radius,
         merge_pixels,
         merge_shrink,
@@ -61,7 +65,8 @@ fn every_field_has_its_row() {
     assert_eq!((iterations, first_iteration, time, seed), (9, 64, Some(30.5), i64::MAX as u64));
     assert_eq!((threads, expected, hrr_alpha, mis), (2, 0.25, 0.125, Heuristic::Power));
     assert_eq!((merge_radius, merge_pixels, merge_shrink), (0.5, 5.0, 1.0));
-    assert_eq!(TABLE.len(), 17);
+    assert_eq!((reused_subpaths, record_spacing), (50, 4));
+    assert_eq!(TABLE.len(), 19);
 }
 
 #[test]

@@ -3,6 +3,7 @@
 use super::Integrator;
 use super::merging;
 use super::recipe::{Base, Recipe};
+use super::records::Records;
 use super::tile::{self, Sample};
 use crate::connect::{self, EyeVertex, Merging, Roulette, Techniques};
 use crate::error::Result;
@@ -12,7 +13,7 @@ use crate::math::Spectrum;
 use crate::roulette::{self, Query};
 use crate::sampler::{Purpose, Sampler, Stream};
 use crate::settings::Settings;
-use crate::subpath::{World, from_light};
+use crate::subpath::{Walk, World, from_light};
 use crate::tally::{Clock, Tally};
 use crate::vertex_bvh::VertexBvh;
 use crate::visibility::Ray;
@@ -38,6 +39,7 @@ pub struct Bidirectional<'a> {
     first_radius: f64,
     cache: LightCache,
     bvh: VertexBvh,
+    records: Records,
 }
 
 impl<'a> Bidirectional<'a> {
@@ -58,6 +60,7 @@ impl<'a> Bidirectional<'a> {
             first_radius: if recipe.merging { merging::first_radius(world, settings) } else { 0.0 },
             cache: LightCache::default(),
             bvh: VertexBvh::new(),
+            records: Records::default(),
         };
         machine.techniques = machine.plan();
         machine
@@ -78,7 +81,8 @@ impl<'a> Bidirectional<'a> {
             base: match recipe.base {
                 Base::Off => 0.0,
                 Base::OwnPath => 1.0,
-                Base::Uniform => f64::from(self.settings.connections) * n_l / vertices,
+                // Any function of the path would do; of uniform picks from any number of subpaths, this is the true one.
+                Base::Uniform | Base::Probabilistic => f64::from(self.settings.connections) * n_l / vertices,
             },
             // Of each iteration its own.
             merging: None,
@@ -186,7 +190,13 @@ impl<'a> Bidirectional<'a> {
                 sum += if vertex.lobe.is_some() {
                     self.play_roulette(&vertex, sample, clock, tally)
                 } else {
-                    self.connect_base(&vertex, sample, clock, tally)
+                    match self.recipe.base {
+                        Base::Off => Spectrum::ZERO,
+                        Base::OwnPath => self.connect_own_path(&vertex, sample, clock, tally),
+                        Base::Uniform | Base::Probabilistic => {
+                            self.connect_picks(&vertex, sample, clock, tally)
+                        }
+                    }
                 };
                 sum += self.merge(&vertex, tally);
             }
@@ -206,27 +216,64 @@ impl<'a> Bidirectional<'a> {
         self.if_visible(vertex.next_event(self.world, &self.techniques, &sample.sampler), clock, tally)
     }
 
-    /// Connections to the sample's own light subpath, or to uniform picks from the cache.
-    fn connect_base(&self, vertex: &EyeVertex, sample: &Sample, clock: Clock, tally: &mut Tally) -> Spectrum {
+    /// Connections to the sample's own light subpath.
+    fn connect_own_path(
+        &self,
+        vertex: &EyeVertex,
+        sample: &Sample,
+        clock: Clock,
+        tally: &mut Tally,
+    ) -> Spectrum {
+        let lights = self.cache.subpath(sample.index as usize);
+        lights
+            .map(|index| self.connect_base(vertex, &self.cache.load(self.world, index), 1.0, clock, tally))
+            .sum()
+    }
+
+    /// Connections to picks from the cache.
+    fn connect_picks(
+        &self,
+        vertex: &EyeVertex,
+        sample: &Sample,
+        clock: Clock,
+        tally: &mut Tally,
+    ) -> Spectrum {
         let (stored, depth) = (self.cache.len(), vertex.walk.depth);
-        let picks = if self.recipe.base == Base::Uniform { self.settings.connections } else { 0 };
-        let picked = (0..picks).filter(|_| stored > 0).map(|n| {
-            let u = sample.sampler.nth(depth, Purpose::CachePick, n);
-            ((u * stored as f64) as usize).min(stored - 1)
-        });
-        let (own, tries) = match self.recipe.base {
-            Base::OwnPath => (self.cache.subpath(sample.index as usize), 1.0),
-            _ => (0..0, f64::from(picks) * self.light_subpaths as f64 / stored as f64),
-        };
+        let picks = f64::from(self.settings.connections);
         let mut sum = Spectrum::ZERO;
-        for index in own.chain(picked) {
-            if depth + 1 + self.cache.depth(index) <= self.settings.max_depth {
-                let light = self.cache.load(self.world, index);
-                let connection = vertex.connect(&self.techniques, &light, self.techniques.base, tries);
-                sum += self.if_visible(connection, clock, tally);
+        for n in 0..self.settings.connections {
+            let u = sample.sampler.nth(depth, Purpose::CachePick, n);
+            if self.recipe.base == Base::Probabilistic {
+                let kind = sample.sampler.nth(depth, Purpose::RecordPick, n);
+                if let Some((light, probability)) =
+                    self.records.pick(vertex.walk.vertex.point.position, kind, u)
+                {
+                    let subpaths = self.settings.reused_subpaths.min(self.light_subpaths) as f64;
+                    sum += self.connect_base(vertex, light, picks * subpaths * probability, clock, tally);
+                }
+            } else if stored > 0 {
+                let light = self.cache.load(self.world, ((u * stored as f64) as usize).min(stored - 1));
+                let tries = picks * self.light_subpaths as f64 / stored as f64;
+                sum += self.connect_base(vertex, &light, tries, clock, tally);
             }
         }
         sum
+    }
+
+    /// A connection where the roulette is off, tried as often as `tries` says.
+    fn connect_base(
+        &self,
+        vertex: &EyeVertex,
+        light: &Walk,
+        tries: f64,
+        clock: Clock,
+        tally: &mut Tally,
+    ) -> Spectrum {
+        if vertex.walk.depth + 1 + light.depth > self.settings.max_depth {
+            return Spectrum::ZERO;
+        }
+        let connection = vertex.connect(&self.techniques, light, self.techniques.base, tries);
+        self.if_visible(connection, clock, tally)
     }
 
     /// Merging with all light vertices within the radius.
@@ -288,6 +335,10 @@ impl Integrator for Bidirectional<'_> {
             self.bvh.build(self.cache.positions())?;
             tally.vertex_bvh_build += start.elapsed().as_secs_f64();
         }
+        if self.recipe.base == Base::Probabilistic {
+            let (world, cache) = (self.world, &self.cache);
+            self.records = Records::new(world, self.settings, &self.techniques, cache, iteration, &mut tally);
+        }
         let key = (self.settings.seed, iteration, self.settings.samples);
         let on_eye_side = |fraction| progress(LIGHT_SHARE + (1.0 - LIGHT_SHARE) * fraction);
         tally.add(&tile::sample_film(film, key, &on_eye_side, |sample, clock, tally| {
@@ -298,6 +349,6 @@ impl Integrator for Bidirectional<'_> {
     }
 
     fn bytes(&self) -> (usize, usize) {
-        (self.cache.bytes(), self.bvh.bytes())
+        (self.cache.bytes() + self.records.bytes(), self.bvh.bytes())
     }
 }

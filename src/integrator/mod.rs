@@ -5,6 +5,7 @@ pub mod recipe;
 pub mod path;
 pub mod bidirectional;
 mod merging;
+mod records;
 mod tile;
 
 pub use recipe::Recipe;

@@ -11,6 +11,8 @@ pub enum Base {
     OwnPath,
     /// Uniform picks from the cache.
     Uniform,
+    /// Picks from a few reused subpaths, in proportion to what they gave nearby.
+    Probabilistic,
 }
 
 /// What an algorithm switches on.
@@ -47,8 +49,14 @@ impl Recipe {
             Integrator::Bpt => Some(Self { base: Base::OwnPath, ..all }),
             Integrator::Lvc => Some(all),
             Integrator::LvcHrr | Integrator::Auto => Some(Self { roulette: true, ..all }),
+            Integrator::Pcbpt => Some(Self { base: Base::Probabilistic, ..all }),
+            Integrator::PcbptHrr => Some(Self { base: Base::Probabilistic, roulette: true, ..all }),
             Integrator::Vcm => Some(Self { merging: true, ..all }),
             Integrator::VcmHrr => Some(Self { merging: true, roulette: true, ..all }),
+            Integrator::Pcvcm => Some(Self { base: Base::Probabilistic, merging: true, ..all }),
+            Integrator::PcvcmHrr => {
+                Some(Self { base: Base::Probabilistic, merging: true, roulette: true, ..all })
+            }
         }
     }
 }

@@ -12,6 +12,9 @@ const SIDE: u32 = 16;
 /// One tile in this many has its shadow rays and queries timed.
 const TIMED: usize = 16;
 
+/// A little under 1: the film's size times this is inside it.
+pub(super) const INSIDE: f64 = 1.0 - 1e-12;
+
 /// One eye sample: where and with which numbers.
 pub struct Sample {
     /// Position on the film.

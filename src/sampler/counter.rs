@@ -29,6 +29,8 @@ pub enum Stream {
     Eye = 2,
     /// The pre-pass that measures how many vertices a light subpath leaves.
     Pilot = 3,
+    /// Eye subpaths that importance records are made along.
+    Records = 4,
 }
 
 /// What a number decides at a vertex.
@@ -53,6 +55,8 @@ pub enum Purpose {
     Survival,
     /// Which cached light vertex is picked.
     CachePick,
+    /// Which distribution over cached light vertices it is picked by.
+    RecordPick,
     /// Key of the roulette over all light vertices.
     Roulette,
 }
@@ -109,7 +113,7 @@ mod tests {
     fn streams_and_purposes_do_not_share_numbers() {
         let mut seen = std::collections::HashSet::new();
         for iteration in 0..4 {
-            for stream in [Stream::Light, Stream::Eye, Stream::Pilot] {
+            for stream in [Stream::Light, Stream::Eye, Stream::Pilot, Stream::Records] {
                 for index in 0..64 {
                     let s = Sampler::new(7, iteration, stream, index);
                     for depth in 0..8 {

@@ -62,16 +62,24 @@ choice! {
         Lvc = "lvc",
         /// As `Lvc`, with hierarchical Russian roulette at glossy eye vertices.
         LvcHrr = "lvc+hrr",
+        /// Connections to picks from a few reused light subpaths, in proportion to what they gave nearby.
+        Pcbpt = "pcbpt",
+        /// As `Pcbpt`, with hierarchical Russian roulette at glossy eye vertices.
+        PcbptHrr = "pcbpt+hrr",
         /// As `Lvc`, with vertex merging as well.
         Vcm = "vcm",
         /// As `Vcm`, with hierarchical Russian roulette at glossy eye vertices.
         VcmHrr = "vcm+hrr",
+        /// As `Pcbpt`, with vertex merging as well.
+        Pcvcm = "pcvcm",
+        /// As `Pcvcm`, with hierarchical Russian roulette at glossy eye vertices.
+        PcvcmHrr = "pcvcm+hrr",
     }
 }
 
 impl Integrator {
     /// Names that are reserved for integrators to come.
-    pub const PLANNED: [&'static str; 5] = ["bpt+hrr", "pcbpt", "pcbpt+hrr", "pcvcm", "pcvcm+hrr"];
+    pub const PLANNED: [&'static str; 1] = ["bpt+hrr"];
 }
 
 choice! {

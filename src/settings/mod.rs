@@ -40,6 +40,10 @@ pub struct Settings {
     pub hrr_alpha: f64,
     /// How techniques that find the same path share its weight.
     pub mis: Heuristic,
+    /// Light subpaths that probabilistic connections (`pcbpt`) choose from.
+    pub reused_subpaths: u64,
+    /// Pixels between the eye subpaths that importance records are made along.
+    pub record_spacing: u32,
     /// Radius of vertex merging in the first iteration, world units; 0 = by `merge_pixels`.
     pub merge_radius: f64,
     /// The same in pixels, at the median distance of what the camera sees.
@@ -65,6 +69,8 @@ impl Default for Settings {
             expected: 1.0,
             hrr_alpha: 0.3,
             mis: Heuristic::Balance,
+            reused_subpaths: 100,
+            record_spacing: 8,
             merge_radius: 0.0,
             merge_pixels: 1.0,
             merge_shrink: 0.75,
@@ -343,7 +349,7 @@ mod tests {
     #[test]
     fn a_refused_value_changes_nothing() {
         let mut s = Settings::default();
-        for (name, value) in [("max_depth", "x"), ("integrator", "pcvcm"), ("time", "-1"), ("nope", "1")] {
+        for (name, value) in [("max_depth", "x"), ("integrator", "bpt+hrr"), ("time", "-1"), ("nope", "1")] {
             s.set(name, value).unwrap_err();
         }
         assert_eq!(s, Settings::default());

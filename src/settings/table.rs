@@ -21,7 +21,8 @@ pub const TABLE: &[Setting] = &[
         heading: TRANSPORT,
         help: "How light is transported",
         doc: "pt: path tracing with next-event estimation. lt: light tracing. bpt: bidirectional path tracing. \
-              lvc: eye subpaths connected to uniform picks from a cache of light vertices. vcm: as lvc, with \
+              lvc: eye subpaths connected to uniform picks from a cache of light vertices. pcbpt: connected to a few \
+              reused light subpaths, picked by what they gave nearby. vcm and pcvcm: as lvc and pcbpt, with \
               vertex merging as well, whose blur shrinks from iteration to iteration. +hrr: with hierarchical \
               Russian roulette at glossy eye vertices. auto: chosen from what the scene contains.",
     },
@@ -78,7 +79,7 @@ pub const TABLE: &[Setting] = &[
         default: "1",
         value_name: "N",
         heading: TRANSPORT,
-        help: "Connections that uniform picks (lvc) try at each eye vertex",
+        help: "Connections that are tried at each eye vertex where the roulette is off",
         doc: "",
     },
     Setting {
@@ -114,6 +115,34 @@ pub const TABLE: &[Setting] = &[
         help: "How techniques that find the same path share its weight",
         doc: "balance: in proportion to their densities. power: to the squares of these, which leaves more to the best \
               one.",
+    },
+    Setting {
+        name: "reused_subpaths",
+        kind: Kind::Integer {
+            min: 1,
+            max: 1_000_000,
+            get: |s| s.reused_subpaths,
+            set: |s, v| s.reused_subpaths = v,
+        },
+        default: "100",
+        value_name: "N",
+        heading: TRANSPORT,
+        help: "Light subpaths that probabilistic connections (pcbpt) choose from",
+        doc: "Each iteration takes 4 bytes and a shadow ray for each pair of an importance record and a vertex of them.",
+    },
+    Setting {
+        name: "record_spacing",
+        kind: Kind::Integer {
+            min: 1,
+            max: 1024,
+            get: |s| s.record_spacing.into(),
+            set: |s, v| s.record_spacing = v as u32,
+        },
+        default: "8",
+        value_name: "PIXELS",
+        heading: TRANSPORT,
+        help: "Distance of the eye subpaths that importance records (pcbpt) are made along",
+        doc: "",
     },
     Setting {
         name: "merge_radius",

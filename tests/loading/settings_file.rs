@@ -187,7 +187,7 @@ fn what_is_to_come_is_unsupported() {
             "[[light]]\ncolor = [1, 1, 1]\ntype = \"environment\"",
             "s.toml:4: not supported: environment lights",
         ),
-        ("[render]\nintegrator = \"pcvcm+hrr\"", "s.toml:3: not supported: integrator 'pcvcm+hrr'"),
+        ("[render]\nintegrator = \"bpt+hrr\"", "s.toml:3: not supported: integrator 'bpt+hrr'"),
     ] {
         let (text, code) = toml_error(&format!("{OBJ_LINE}{toml}\n"));
         assert!(text.starts_with(start) && code == 5, "{text} {code}");
