@@ -1,158 +1,22 @@
 //! Connections: what a path is worth whose two halves are joined by an edge, each technique's share included.
 
 use crate::bsdf::Transport;
-use crate::math::{Spectrum, luminance};
-use crate::mis::{Heuristic, per_area};
-use crate::roulette::{self, Lobe};
+use crate::math::Spectrum;
+use crate::mis::per_area;
 use crate::sampler::{Purpose, Sampler};
+use crate::subpath::World;
 use crate::subpath::walk::{Start, Walk};
-use crate::subpath::{Vertex, World};
+use crate::techniques::{Lobes, Merging, Techniques};
 use crate::visibility::{Ray, offset};
 use glam::{DVec2, DVec3};
-
-/// How often each technique tries a path, per eye sample: the m of docs/theory.md section 6. A technique that is off
-/// has 0.
-#[derive(Debug, Clone, Copy)]
-pub struct Techniques {
-    /// How they share a path.
-    pub heuristic: Heuristic,
-    /// m_0: the eye subpath hits an emitter.
-    pub eye_hits: f64,
-    /// m_1: next-event estimation, relative to emission, which draws its points from the same density.
-    pub next_event: f64,
-    /// m_{k-1}: light subpaths seen by the camera, light subpaths over eye samples.
-    pub light_image: f64,
-    /// m_s, 2 <= s <= k-2, where the roulette is off.
-    pub base: f64,
-    /// m_s / P where the roulette is on.
-    pub roulette: Option<Roulette>,
-    /// How light vertices are merged with eye vertices.
-    pub merging: Option<Merging>,
-}
-
-/// Vertex merging: light vertices near an eye vertex count as if they were it.
-#[derive(Debug, Clone, Copy)]
-pub struct Merging {
-    /// n_L, the number of light subpaths emitted.
-    pub light_subpaths: f64,
-    /// How near, world units.
-    pub radius: f64,
-}
-
-impl Merging {
-    /// eta = n_L pi r^2: how many light subpaths end in an eye vertex's disc, per unit of their density.
-    pub fn eta(&self) -> f64 {
-        self.light_subpaths * std::f64::consts::PI * self.radius * self.radius
-    }
-}
-
-/// Where and how hard the roulette plays.
-#[derive(Debug, Clone, Copy)]
-pub struct Roulette {
-    /// n_L, the number of light subpaths emitted.
-    pub light_subpaths: f64,
-    /// C, world units squared.
-    pub constant: f64,
-    /// Largest GGX roughness at which it plays.
-    pub max_alpha: f64,
-}
-
-impl Roulette {
-    /// n_L P: how often an edge with this offset (light - eye) is kept.
-    pub fn density(&self, lobe: &Lobe, offset: DVec3) -> f64 {
-        self.light_subpaths * roulette::probability(std::slice::from_ref(lobe), self.constant, offset)
-    }
-}
-
-impl Techniques {
-    /// All of them off.
-    pub fn none(heuristic: Heuristic) -> Self {
-        Self {
-            heuristic,
-            eye_hits: 0.0,
-            next_event: 0.0,
-            light_image: 0.0,
-            base: 0.0,
-            roulette: None,
-            merging: None,
-        }
-    }
-
-    /// The lobe by which the roulette judges light vertices, at a vertex seen from `w_eye`; `None` where it is off.
-    pub fn lobe(&self, vertex: &Vertex, w_eye: DVec3) -> Option<Lobe> {
-        let limit = self.roulette?.max_alpha;
-        let glossy = vertex.bsdf.glossy()?;
-        if glossy.alpha_x.max(glossy.alpha_y) > limit || glossy.eta.is_some() {
-            return None;
-        }
-        // The lobe lies on the viewer's side; the model is the same from both.
-        let mut frame = vertex.frame;
-        if frame.z.dot(w_eye) < 0.0 {
-            (frame.x, frame.z) = (-frame.x, -frame.z);
-        }
-        let w = frame.to_local(w_eye);
-        let mirrored = frame.to_world(DVec3::new(-w.x, -w.y, w.z));
-        let lobe = Lobe::from_ggx_reflection(&frame, w_eye, glossy.alpha_x, glossy.alpha_y, 1.0);
-        let weight = luminance(vertex.factor(w_eye, mirrored)) * vertex.cos_ng(mirrored);
-        // Without a weight nothing would ever be kept, though there may be light beside the mirrored direction.
-        (weight > 0.0).then(|| lobe.with_weight(weight))
-    }
-
-    /// m_s of an edge between two surfaces, neither of them delta. `lobe`: that of the eye-side vertex; `offset`: from
-    /// there to the light-side vertex.
-    pub fn connection(&self, lobe: Option<&Lobe>, offset: DVec3) -> f64 {
-        match (&self.roulette, lobe) {
-            (Some(roulette), Some(lobe)) => roulette.density(lobe, offset),
-            _ => self.base,
-        }
-    }
-
-    /// m of the edge that leads to the light vertex's predecessor, were the light vertex an eye vertex seen from
-    /// `w_eye`.
-    pub fn before(&self, light: &Walk, w_eye: DVec3) -> f64 {
-        if light.after_delta || light.vertex.bsdf.is_delta() {
-            0.0
-        } else if light.depth == 1 {
-            self.next_event
-        } else if self.roulette.is_none() {
-            self.base
-        } else {
-            self.connection(self.lobe(&light.vertex, w_eye).as_ref(), light.to_previous())
-        }
-    }
-
-    /// eta at vertices that are not delta; 0 without merging.
-    pub fn eta(&self) -> f64 {
-        self.merging.map_or(0.0, |merging| merging.eta())
-    }
-
-    /// L_s of a technique whose eye side ends with an edge along `w_eye` at the light vertex; `density`: in which the
-    /// eye side would choose that vertex.
-    fn light_others(&self, light: &Walk, density: f64, w_eye: DVec3) -> f64 {
-        self.heuristic.others(density, self.light_total(light, w_eye))
-    }
-
-    /// The sum over the light side's techniques up to a light vertex from which the path goes on along `w_eye`.
-    fn light_total(&self, light: &Walk, w_eye: DVec3) -> f64 {
-        let back = light.vertex.pdf_w(w_eye, light.vertex.wo);
-        self.heuristic.total(&light.side, self.before(light, w_eye), back, self.eta())
-    }
-
-    /// Goes on along a light subpath.
-    pub fn next_light(&self, world: &World<'_>, light: &Walk, sampler: &Sampler) -> Option<Walk> {
-        light.next(world, self.heuristic, Transport::Importance, sampler, self.eta(), |wi| {
-            self.before(light, wi)
-        })
-    }
-}
 
 /// An eye vertex: its walk, and what connections to it share.
 #[derive(Debug, Clone, Copy)]
 pub struct EyeVertex {
     /// The walk.
     pub walk: Walk,
-    /// The roulette's lobe here.
-    pub lobe: Option<Lobe>,
+    /// The roulette's lobes here; empty where it is off.
+    pub lobes: Lobes,
     /// m of the edge to the previous eye vertex, were this vertex the light subpath's last.
     m_previous: f64,
     /// m of that edge, were this vertex on an emitter.
@@ -178,8 +42,8 @@ impl EyeVertex {
 
     fn new(techniques: &Techniques, walk: Walk, m_previous: f64, m_emitter: f64) -> Self {
         let delta = walk.vertex.bsdf.is_delta();
-        let lobe = if delta { None } else { techniques.lobe(&walk.vertex, walk.vertex.wo) };
-        Self { walk, lobe, m_previous: if delta { 0.0 } else { m_previous }, m_emitter }
+        let lobes = if delta { Lobes::NONE } else { techniques.lobes(&walk.vertex, walk.vertex.wo) };
+        Self { walk, lobes, m_previous: if delta { 0.0 } else { m_previous }, m_emitter }
     }
 
     /// Goes on to the next eye vertex.
@@ -195,7 +59,7 @@ impl EyeVertex {
         if walk.after_delta {
             return Some(Self::new(techniques, walk, 0.0, 0.0));
         }
-        let m = techniques.connection(self.lobe.as_ref(), -walk.to_previous());
+        let m = techniques.connection(&self.lobes, -walk.to_previous());
         Some(Self::new(techniques, walk, m, techniques.next_event))
     }
 

@@ -28,6 +28,7 @@ pub mod tally;
 pub mod mis;
 pub mod subpath;
 pub mod light_cache;
+pub mod techniques;
 pub mod connect;
 
 pub mod integrator;

@@ -5,7 +5,7 @@
 use crate::support::scenes;
 use glam::{DVec2, DVec3};
 use hrr::bsdf::Transport;
-use hrr::connect::{EyeVertex, Merging, Roulette, Techniques, connect_camera};
+use hrr::connect::{EyeVertex, connect_camera};
 use hrr::light::EmitterPoint;
 use hrr::math::Spectrum;
 use hrr::mis::Heuristic;
@@ -13,6 +13,7 @@ use hrr::sampler::{Purpose, Sampler, Stream};
 use hrr::settings::{Backend, Settings};
 use hrr::subpath::walk::Start;
 use hrr::subpath::{Vertex, Walk, World, from_light};
+use hrr::techniques::{Merging, Roulette, Techniques};
 use hrr::visibility::offset;
 
 /// Numbers with no special relation to each other.
@@ -96,9 +97,9 @@ impl Path {
             if s == k - 1 {
                 return t.light_image;
             }
-            let lobe = t.lobe(&self.surfaces[s - 1], self.to(world, s, s + 1));
+            let lobes = t.lobes(&self.surfaces[s - 1], self.to(world, s, s + 1));
             let offset = self.position(world, s - 1) - self.position(world, s);
-            t.connection(lobe.as_ref(), offset)
+            t.connection(&lobes, offset)
         };
         let b = |s: usize| (0..s).map(fw).product::<f64>() * (s..k - 1).map(rv).product::<f64>();
         let eta = t.merging.map_or(0.0, |m| m.light_subpaths * std::f64::consts::PI * m.radius * m.radius);
@@ -238,7 +239,7 @@ fn check(t: &Techniques) {
             let path = path(start, &lights, &eyes);
             let s = lights.len() + 1;
             let offset = light.vertex.point.position - eye.walk.vertex.point.position;
-            let m = t.connection(eye.lobe.as_ref(), offset);
+            let m = t.connection(&eye.lobes, offset);
             if let Some((value, _)) = eye.connect(t, light, m, 1.0) {
                 let (y, z) = (&light.vertex, &eye.walk.vertex);
                 let w = offset.normalize();

@@ -5,7 +5,7 @@ use super::merging;
 use super::recipe::{Base, Recipe};
 use super::records::Records;
 use super::tile::{self, Sample};
-use crate::connect::{self, EyeVertex, Merging, Roulette, Techniques};
+use crate::connect::{self, EyeVertex};
 use crate::error::Result;
 use crate::film::Film;
 use crate::light_cache::LightCache;
@@ -15,6 +15,7 @@ use crate::sampler::{Purpose, Sampler, Stream};
 use crate::settings::Settings;
 use crate::subpath::{Walk, World, from_light};
 use crate::tally::{Clock, Tally};
+use crate::techniques::{Merging, Roulette, Techniques};
 use crate::vertex_bvh::VertexBvh;
 use crate::visibility::Ray;
 use rayon::prelude::*;
@@ -187,7 +188,7 @@ impl<'a> Bidirectional<'a> {
             }
             if !vertex.walk.vertex.bsdf.is_delta() {
                 sum += self.next_event(&vertex, sample, clock, tally);
-                sum += if vertex.lobe.is_some() {
+                sum += if !vertex.lobes.is_empty() {
                     self.play_roulette(&vertex, sample, clock, tally)
                 } else {
                     match self.recipe.base {
@@ -299,13 +300,11 @@ impl<'a> Bidirectional<'a> {
         clock: Clock,
         tally: &mut Tally,
     ) -> Spectrum {
-        let (Some(lobe), Some(roulette)) = (&vertex.lobe, &self.techniques.roulette) else {
-            return Spectrum::ZERO;
-        };
+        let Some(roulette) = &self.techniques.roulette else { return Spectrum::ZERO };
         let depth = vertex.walk.depth;
         let key = sample.sampler.bits(depth, Purpose::Roulette);
         let position = vertex.walk.vertex.point.position;
-        let query = Query::new(position, std::slice::from_ref(lobe), roulette.constant, key);
+        let query = Query::new(position, &vertex.lobes, roulette.constant, key);
         let mut kept = Vec::new();
         let Tally { roulette: counters, roulette_seconds, .. } = tally;
         clock.time(roulette_seconds, || {

@@ -9,13 +9,14 @@
 //! for each pair.
 
 use super::tile;
-use crate::connect::{EyeVertex, Techniques};
+use crate::connect::EyeVertex;
 use crate::light_cache::LightCache;
 use crate::math::luminance;
 use crate::sampler::{Purpose, Sampler, Stream};
 use crate::settings::Settings;
 use crate::subpath::{Walk, World};
 use crate::tally::Tally;
+use crate::techniques::Techniques;
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 use rstar::RTree;
@@ -136,7 +137,7 @@ fn trace(
     let (mut records, mut rays) = (Vec::new(), 0);
     let mut eye = EyeVertex::first(world, techniques, raster);
     while let Some(vertex) = eye.filter(|v| v.walk.depth < settings.max_depth) {
-        if !vertex.walk.vertex.bsdf.is_delta() && vertex.lobe.is_none() {
+        if !vertex.walk.vertex.bsdf.is_delta() && vertex.lobes.is_empty() {
             let contributions: Vec<f64> = lights
                 .iter()
                 .map(|light| match vertex.connect(techniques, light, techniques.base, 1.0) {

@@ -46,6 +46,17 @@ impl Lobe {
         Self { frame, alpha_x, alpha_y, a2: a * a, inv_x: 1.0 / alpha_x, inv_y: 1.0 / alpha_y, weight }
     }
 
+    /// What stands where there is no lobe: it accepts nothing.
+    pub const NONE: Self = Self {
+        frame: Frame { x: DVec3::X, y: DVec3::Y, z: DVec3::Z },
+        alpha_x: 1.0,
+        alpha_y: 1.0,
+        a2: 1.0,
+        inv_x: 1.0,
+        inv_y: 1.0,
+        weight: 0.0,
+    };
+
     /// The lobe that is the same in all directions: for diffuse reflection, and as a floor under another lobe.
     pub fn sphere(weight: f64) -> Self {
         Self::new(Frame { x: DVec3::X, y: DVec3::Y, z: DVec3::Z }, 1.0, 1.0, weight)

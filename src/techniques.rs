@@ -1,0 +1,182 @@
+//! How often each technique tries a path, and with which lobes the roulette judges light vertices.
+
+use crate::bsdf::Transport;
+use crate::math::luminance;
+use crate::mis::Heuristic;
+use crate::roulette::{self, Lobe};
+use crate::sampler::Sampler;
+use crate::subpath::walk::Walk;
+use crate::subpath::{Vertex, World};
+use glam::DVec3;
+use std::ops::Deref;
+
+/// How often each technique tries a path, per eye sample: the m of docs/theory.md section 6. A technique that is off
+/// has 0.
+#[derive(Debug, Clone, Copy)]
+pub struct Techniques {
+    /// How they share a path.
+    pub heuristic: Heuristic,
+    /// m_0: the eye subpath hits an emitter.
+    pub eye_hits: f64,
+    /// m_1: next-event estimation, relative to emission, which draws its points from the same density.
+    pub next_event: f64,
+    /// m_{k-1}: light subpaths seen by the camera, light subpaths over eye samples.
+    pub light_image: f64,
+    /// m_s, 2 <= s <= k-2, where the roulette is off.
+    pub base: f64,
+    /// m_s / P where the roulette is on.
+    pub roulette: Option<Roulette>,
+    /// How light vertices are merged with eye vertices.
+    pub merging: Option<Merging>,
+}
+
+/// Vertex merging: light vertices near an eye vertex count as if they were it.
+#[derive(Debug, Clone, Copy)]
+pub struct Merging {
+    /// n_L, the number of light subpaths emitted.
+    pub light_subpaths: f64,
+    /// How near, world units.
+    pub radius: f64,
+}
+
+impl Merging {
+    /// eta = n_L pi r^2: how many light subpaths end in an eye vertex's disc, per unit of their density.
+    pub fn eta(&self) -> f64 {
+        self.light_subpaths * std::f64::consts::PI * self.radius * self.radius
+    }
+}
+
+/// Where and how hard the roulette plays.
+#[derive(Debug, Clone, Copy)]
+pub struct Roulette {
+    /// n_L, the number of light subpaths emitted.
+    pub light_subpaths: f64,
+    /// C, world units squared.
+    pub constant: f64,
+    /// Largest GGX roughness at which it plays.
+    pub max_alpha: f64,
+}
+
+impl Roulette {
+    /// n_L P: how often an edge with this offset (light - eye) is kept.
+    pub fn density(&self, lobes: &[Lobe], offset: DVec3) -> f64 {
+        self.light_subpaths * roulette::probability(lobes, self.constant, offset)
+    }
+}
+
+/// The roulette's lobes at a vertex: of reflection, and of transmission where light passes.
+#[derive(Debug, Clone, Copy)]
+pub struct Lobes {
+    list: [Lobe; 2],
+    count: usize,
+}
+
+impl Lobes {
+    /// Where the roulette is off.
+    pub const NONE: Self = Self { list: [Lobe::NONE; 2], count: 0 };
+
+    fn push(&mut self, lobe: Lobe) {
+        self.list[self.count] = lobe;
+        self.count += 1;
+    }
+}
+
+impl Deref for Lobes {
+    type Target = [Lobe];
+
+    fn deref(&self) -> &[Lobe] {
+        &self.list[..self.count]
+    }
+}
+
+impl Techniques {
+    /// All of them off.
+    pub fn none(heuristic: Heuristic) -> Self {
+        Self {
+            heuristic,
+            eye_hits: 0.0,
+            next_event: 0.0,
+            light_image: 0.0,
+            base: 0.0,
+            roulette: None,
+            merging: None,
+        }
+    }
+
+    /// The lobes by which the roulette judges light vertices, at a vertex seen from `w_eye`; none where it is off.
+    pub fn lobes(&self, vertex: &Vertex, w_eye: DVec3) -> Lobes {
+        let mut lobes = Lobes::NONE;
+        let (Some(roulette), Some(glossy)) = (&self.roulette, vertex.bsdf.glossy()) else { return lobes };
+        let (alpha_x, alpha_y) = (glossy.alpha_x, glossy.alpha_y);
+        if alpha_x.max(alpha_y) > roulette.max_alpha {
+            return lobes;
+        }
+        // The frame's z on the viewer's side: of the model itself, only which side is inside changes with that.
+        let mut frame = vertex.frame;
+        let outside = frame.z.dot(w_eye) >= 0.0;
+        if !outside {
+            (frame.x, frame.z) = (-frame.x, -frame.z);
+        }
+        let reflected = Lobe::from_ggx_reflection(&frame, w_eye, alpha_x, alpha_y, 1.0);
+        let transmitted = glossy.eta.map(|eta| {
+            let eta = if outside { eta } else { 1.0 / eta };
+            Lobe::from_ggx_transmission(&frame, w_eye, alpha_x, alpha_y, eta, 1.0)
+        });
+        for lobe in [Some(reflected), transmitted].into_iter().flatten() {
+            // Without a weight nothing would ever be kept, though there may be light beside the axis.
+            let axis = lobe.frame().z;
+            let weight = luminance(vertex.factor(w_eye, axis)) * vertex.cos_ng(axis);
+            if weight > 0.0 {
+                lobes.push(lobe.with_weight(weight));
+            }
+        }
+        lobes
+    }
+
+    /// m_s of an edge between two surfaces, neither of them delta. `lobes`: those of the eye-side vertex; `offset`:
+    /// from there to the light-side vertex.
+    pub fn connection(&self, lobes: &Lobes, offset: DVec3) -> f64 {
+        match &self.roulette {
+            Some(roulette) if !lobes.is_empty() => roulette.density(lobes, offset),
+            _ => self.base,
+        }
+    }
+
+    /// m of the edge that leads to the light vertex's predecessor, were the light vertex an eye vertex seen from
+    /// `w_eye`.
+    pub fn before(&self, light: &Walk, w_eye: DVec3) -> f64 {
+        if light.after_delta || light.vertex.bsdf.is_delta() {
+            0.0
+        } else if light.depth == 1 {
+            self.next_event
+        } else if self.roulette.is_none() {
+            self.base
+        } else {
+            self.connection(&self.lobes(&light.vertex, w_eye), light.to_previous())
+        }
+    }
+
+    /// eta at vertices that are not delta; 0 without merging.
+    pub fn eta(&self) -> f64 {
+        self.merging.map_or(0.0, |merging| merging.eta())
+    }
+
+    /// L_s of a technique whose eye side ends with an edge along `w_eye` at the light vertex; `density`: in which the
+    /// eye side would choose that vertex.
+    pub(crate) fn light_others(&self, light: &Walk, density: f64, w_eye: DVec3) -> f64 {
+        self.heuristic.others(density, self.light_total(light, w_eye))
+    }
+
+    /// The sum over the light side's techniques up to a light vertex from which the path goes on along `w_eye`.
+    pub(crate) fn light_total(&self, light: &Walk, w_eye: DVec3) -> f64 {
+        let back = light.vertex.pdf_w(w_eye, light.vertex.wo);
+        self.heuristic.total(&light.side, self.before(light, w_eye), back, self.eta())
+    }
+
+    /// Goes on along a light subpath.
+    pub fn next_light(&self, world: &World<'_>, light: &Walk, sampler: &Sampler) -> Option<Walk> {
+        light.next(world, self.heuristic, Transport::Importance, sampler, self.eta(), |wi| {
+            self.before(light, wi)
+        })
+    }
+}
