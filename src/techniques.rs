@@ -24,7 +24,7 @@ pub struct Techniques {
     pub light_image: f64,
     /// m_s, 2 <= s <= k-2, where the roulette is off.
     pub base: f64,
-    /// m_s / P where the roulette is on.
+    /// m_s where the roulette is on.
     pub roulette: Option<Roulette>,
     /// How light vertices are merged with eye vertices.
     pub merging: Option<Merging>,
@@ -49,7 +49,8 @@ impl Merging {
 /// Where and how hard the roulette plays.
 #[derive(Debug, Clone, Copy)]
 pub struct Roulette {
-    /// n_L, the number of light subpaths emitted.
+    /// m_s / P: light subpaths emitted for each eye sample of a pixel. All samples of a pixel judge the same light
+    /// vertices, so that for the weights they share them, though each one really tries them all.
     pub light_subpaths: f64,
     /// C, world units squared.
     pub constant: f64,
@@ -58,7 +59,7 @@ pub struct Roulette {
 }
 
 impl Roulette {
-    /// n_L P: how often an edge with this offset (light - eye) is kept.
+    /// m_s of an edge with this offset (light - eye).
     pub fn density(&self, lobes: &[Lobe], offset: DVec3) -> f64 {
         self.light_subpaths * roulette::probability(lobes, self.constant, offset)
     }

@@ -13,6 +13,7 @@ mod image;
 mod settings;
 mod cli;
 mod agreement;
+mod closed_form;
 mod ray_offset;
 mod visibility;
 mod determinism;

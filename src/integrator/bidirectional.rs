@@ -88,7 +88,7 @@ impl<'a> Bidirectional<'a> {
             // Of each iteration its own.
             merging: None,
             roulette: recipe.roulette.then(|| Roulette {
-                light_subpaths: n_l,
+                light_subpaths: n_l / eye_samples,
                 constant: self.settings.expected * self.world.scene.mesh.total_area() / vertices,
                 max_alpha: self.settings.hrr_alpha,
             }),
@@ -314,8 +314,8 @@ impl<'a> Bidirectional<'a> {
         for (index, p) in kept {
             if depth + 1 + self.cache.depth(index as usize) <= self.settings.max_depth {
                 let light = self.cache.load(self.world, index as usize);
-                let m = roulette.light_subpaths * p;
-                sum += self.if_visible(vertex.connect(&self.techniques, &light, m, m), clock, tally);
+                let (m, tries) = (roulette.light_subpaths * p, self.light_subpaths as f64 * p);
+                sum += self.if_visible(vertex.connect(&self.techniques, &light, m, tries), clock, tally);
             }
         }
         sum

@@ -70,7 +70,7 @@ pub fn quad(mesh: &mut Mesh, corners: [[i8; 3]; 4], scale: f32, center: Vec3, ma
     mesh.materials.extend([material; 2]);
 }
 
-fn cube(mesh: &mut Mesh, half: f32, center: Vec3, material: u32) {
+pub fn cube(mesh: &mut Mesh, half: f32, center: Vec3, material: u32) {
     for axis in 0..3 {
         for side in [-1i8, 1] {
             let corner = |u: i8, v: i8| {

@@ -1,0 +1,147 @@
+//! Scenes whose radiance is known, by every integrator and every backend.
+
+use crate::support::estimate::estimate;
+use crate::support::scenes::{cube, in_memory, quad};
+use glam::{DVec3, Vec3};
+use hrr::bsdf::Reflectance;
+use hrr::geometry::Mesh;
+use hrr::material::{Material, Scattering};
+use hrr::math::Spectrum;
+use hrr::scene::Scene;
+use hrr::settings::{Backend, Integrator, Settings};
+
+/// Asserts that the image's mean is `radiance` within half a percent, and within its noise.
+fn assert_radiance(name: &str, scene: &Scene, settings: &Settings, radiance: f64) {
+    let settings = Settings { max_depth: 24, ..settings.clone() };
+    let e = estimate(scene, &settings, 8);
+    let pixels = f64::from(scene.film.width * scene.film.height);
+    let (mean, sigma) = (e.total.x / pixels, e.total_variance.x.sqrt() / pixels);
+    let what = format!("{name}, {}, {}", settings.integrator, settings.visibility);
+    println!("{what}: {mean:.6} +- {sigma:.6}, expected {radiance:.6}");
+    assert!((mean / radiance - 1.0).abs() < 0.005, "{what}: {mean}, not {radiance}");
+    // Some of these are exact but for the film's f32 and rounding.
+    assert!(
+        (mean - radiance).abs() < 4.5 * sigma + 1e-6 * radiance,
+        "{what}: {mean}, not {radiance} +- {sigma}"
+    );
+}
+
+/// Every integrator but those of `without`, with the fastest backend; path tracing and the roulette with all backends.
+fn check(name: &str, scene: &Scene, settings: &Settings, without: &[Integrator], radiance: f64) {
+    for integrator in Integrator::ALL {
+        if integrator != Integrator::Auto && !without.contains(&integrator) {
+            let settings = Settings { integrator, visibility: Backend::BEST, ..settings.clone() };
+            assert_radiance(name, scene, &settings, radiance);
+        }
+    }
+    for visibility in Backend::ALL.into_iter().filter(|&b| b != Backend::BEST) {
+        if cfg!(feature = "embree") || visibility != Backend::Embree {
+            for integrator in [Integrator::Pt, Integrator::LvcHrr] {
+                let settings = Settings { integrator, visibility, ..settings.clone() };
+                assert_radiance(name, scene, &settings, radiance);
+            }
+        }
+    }
+}
+
+fn small(mut scene: Scene) -> Scene {
+    (scene.film.width, scene.film.height) = (8, 8);
+    scene
+}
+
+/// The six sides of a box two metres wide, front faces inward, the left one of material `left`.
+fn room(materials: [u32; 2]) -> Mesh {
+    let mut mesh = Mesh::default();
+    let [other, left] = materials;
+    for (corners, material) in [
+        ([[-1, -1, 1], [1, -1, 1], [1, -1, -1], [-1, -1, -1]], other),
+        ([[-1, 1, -1], [1, 1, -1], [1, 1, 1], [-1, 1, 1]], other),
+        ([[-1, -1, -1], [-1, 1, -1], [-1, 1, 1], [-1, -1, 1]], left),
+        ([[1, -1, 1], [1, 1, 1], [1, 1, -1], [1, -1, -1]], other),
+        ([[-1, -1, -1], [1, -1, -1], [1, 1, -1], [-1, 1, -1]], other),
+        ([[-1, -1, 1], [-1, 1, 1], [1, 1, 1], [1, -1, 1]], other),
+    ] {
+        quad(&mut mesh, corners, 1.0, Vec3::ZERO, material);
+    }
+    mesh
+}
+
+fn lit(name: &str, scattering: Scattering, emission: f64) -> Material {
+    let mut material = Material::new(name, scattering);
+    material.emission = Spectrum::splat(emission);
+    material
+}
+
+fn diffuse(albedo: f64) -> Scattering {
+    Scattering::Diffuse { albedo: Spectrum::splat(albedo), map: None }
+}
+
+/// Walls that all emit 1 and reflect one half, diffuse ones and a mirror: everything has radiance 1 + 1/2 + 1/4 ...
+#[test]
+fn a_furnace_is_evenly_bright() {
+    let mirror = Scattering::Mirror { reflectance: Spectrum::splat(0.5) };
+    for (name, left) in [("diffuse furnace", diffuse(0.5)), ("furnace with a mirror", mirror)] {
+        let materials = vec![lit("wall", diffuse(0.5), 1.0), lit("left", left, 1.0)];
+        let scene = in_memory(room([0, 1]), materials, DVec3::new(0.3, 0.1, 0.8), DVec3::NEG_X, 60.0);
+        let settings = Settings { iterations: 64, samples: 192, merge_radius: 0.01, ..Settings::default() };
+        // What comes by way of the mirror, light tracing does not see.
+        let without = if name == "diffuse furnace" { &[][..] } else { &[Integrator::Lt] };
+        check(name, &small(scene), &settings, without, 2.0);
+    }
+}
+
+/// A convex thing in surroundings of radiance 1 shows its albedo.
+#[test]
+fn even_surroundings_show_the_albedo() {
+    let materials = vec![lit("sky", diffuse(0.0), 1.0), Material::diffuse("thing", Spectrum::splat(0.6))];
+    let mut mesh = room([0, 0]);
+    cube(&mut mesh, 0.3, Vec3::ZERO, 1);
+    let scene = small(in_memory(mesh, materials, DVec3::new(0.2, 0.1, 0.9), DVec3::ZERO, 8.0));
+    let settings = Settings { iterations: 64, samples: 256, ..Settings::default() };
+    // What is seen under 8 degrees, too few light subpaths meet.
+    check("surroundings", &scene, &settings, &[Integrator::Lt], 0.6);
+}
+
+/// Form factor of a rectangle of sides a, b at distance 1, from below one of its corners [Howell, B-3].
+fn corner(a: f64, b: f64) -> f64 {
+    let (p, q) = ((1.0 + a * a).sqrt(), (1.0 + b * b).sqrt());
+    (a / p * (b / p).atan() + b / q * (a / q).atan()) / std::f64::consts::TAU
+}
+
+/// A lamp of one square metre a metre above a plate of albedo 0.7, whose middle the camera sees from aside.
+fn plates(mesh: &mut Mesh, materials: &mut Vec<Material>) -> f64 {
+    *materials = vec![Material::diffuse("plate", Spectrum::splat(0.7)), lit("lamp", diffuse(0.0), 1.0)];
+    quad(mesh, [[-1, 0, 1], [1, 0, 1], [1, 0, -1], [-1, 0, -1]], 0.5, Vec3::ZERO, 0);
+    quad(mesh, [[-1, 0, -1], [1, 0, -1], [1, 0, 1], [-1, 0, 1]], 0.5, Vec3::Y, 1);
+    0.7 * 4.0 * corner(0.5, 0.5)
+}
+
+#[test]
+fn a_lamp_over_a_plate_has_its_form_factor() {
+    let (mut mesh, mut materials) = (Mesh::default(), Vec::new());
+    let radiance = plates(&mut mesh, &mut materials);
+    let scene = small(in_memory(mesh, materials, DVec3::new(2.0, 0.6, 0.0), DVec3::ZERO, 0.2));
+    let settings = Settings { iterations: 64, samples: 16, ..Settings::default() };
+    check("plates", &scene, &settings, &[Integrator::Lt], radiance);
+}
+
+/// The same plate, seen in a mirror that also throws the lamp's image on it: light by way of the mirror arrives as if
+/// from a second lamp behind it.
+#[test]
+fn a_mirror_shows_the_plate_and_the_lamps_second_light() {
+    for (name, alpha) in [("smooth mirror", 0.0), ("mirror of alpha 1e-4", 1e-4)] {
+        let (mut mesh, mut materials) = (Mesh::default(), Vec::new());
+        let direct = plates(&mut mesh, &mut materials);
+        let white = Reflectance::Schlick { f0: Spectrum::ONE };
+        let scattering = Scattering::Conductor { reflectance: white, alpha_x: alpha, alpha_y: alpha };
+        materials.push(Material::new("mirror", scattering));
+        let at = Vec3::new(-1.5, 0.5, 0.0);
+        quad(&mut mesh, [[0, -1, -1], [0, 1, -1], [0, 1, 1], [0, -1, 1]], 1.0, at, 2);
+        let second = 0.7 * 2.0 * (corner(3.5, 0.5) - corner(2.5, 0.5));
+        let scene =
+            small(in_memory(mesh, materials, DVec3::new(1.0, 0.8, 0.0), DVec3::new(-3.0, 0.0, 0.0), 0.2));
+        let settings =
+            Settings { iterations: 96, samples: 64, light_subpaths: 20_000, ..Settings::default() };
+        check(name, &scene, &settings, &[Integrator::Lt], direct + second);
+    }
+}
