@@ -1,5 +1,7 @@
 //! How fast the roulette is, in ratios measured within one run. `cargo bench --bench roulette [-- <part>...]`.
 
+#[path = "support/variance.rs"]
+mod variance;
 #[path = "support/workload.rs"]
 mod workload;
 
@@ -119,8 +121,14 @@ fn overhead() {
 
 fn main() {
     let wanted: Vec<String> = std::env::args().skip(1).filter(|a| !a.starts_with("--")).collect();
-    let parts: [(&str, fn()); 4] =
-        [("overhead", overhead), ("visits", visits), ("all", against_testing_all), ("growth", growth)];
+    let parts: [(&str, fn()); 6] = [
+        ("overhead", overhead),
+        ("visits", visits),
+        ("all", against_testing_all),
+        ("growth", growth),
+        ("rules", variance::rules),
+        ("ranges", variance::ranges),
+    ];
     for (name, part) in parts {
         if wanted.is_empty() || wanted.iter().any(|w| w == name) {
             part();

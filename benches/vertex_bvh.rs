@@ -1,5 +1,9 @@
-//! How long the tree over light vertices takes to build, against obvhs on the same points in the same run.
-//! `cargo bench --bench vertex_bvh`.
+//! How long the tree over light vertices takes to build, against obvhs and Embree's Morton builder on the same points
+//! in the same run. `cargo bench --bench vertex_bvh`.
+
+#[cfg(feature = "embree")]
+#[path = "support/embree_builder.rs"]
+mod embree_builder;
 
 #[path = "support/workload.rs"]
 #[expect(dead_code, reason = "queries are not timed here")]
@@ -27,9 +31,13 @@ fn main() {
         let indices: Vec<_> = (0..n as u32).collect();
         let mut ours = VertexBvh::new();
         let params = BvhBuildParams::fastest_build();
-        let mut best = [f64::INFINITY; 3];
+        #[cfg(feature = "embree")]
+        let (mut embree, given) = (embree_builder::Builder::new(), embree_builder::primitives(&points));
+        let mut best = [f64::INFINITY; 4];
         for _ in 0..if n > 1_000_000 { 3 } else { RUNS } {
             let copy = indices.clone();
+            #[cfg(feature = "embree")]
+            let mut given = given.clone();
             let times = [
                 seconds(|| ours.build(&points).unwrap()),
                 seconds(|| {
@@ -44,21 +52,24 @@ fn main() {
                 seconds(|| {
                     std::hint::black_box(build_bvh2(&boxes, params, &mut Duration::default()));
                 }),
+                #[cfg(feature = "embree")]
+                seconds(|| embree.build(&mut given)),
+                #[cfg(not(feature = "embree"))]
+                f64::NAN,
             ];
             for (b, t) in best.iter_mut().zip(times) {
-                *b = b.min(t);
+                *b = b.min(t); // infinite where NaN
             }
         }
         let ns = best.map(|b| b * 1e9 / n as f64);
         println!(
-            "{n:9} vertices, {} threads: ours {:6.1} ns/vertex ({:4.1} B/vertex), obvhs PLOC {:6.1} ({:.2}x), fastest_build {:6.1} ({:.2}x)",
+            "{n:9} vertices, {} threads: ours {:6.1} ns/vertex ({:4.1} B/vertex)",
             rayon::current_num_threads(),
             ns[0],
             ours.bytes() as f64 / n as f64,
-            ns[1],
-            ns[1] / ns[0],
-            ns[2],
-            ns[2] / ns[0],
         );
+        for (name, ns_other) in ["obvhs PLOC", "obvhs fastest_build", "Embree Morton"].iter().zip(&ns[1..]) {
+            println!("    {name:20} {ns_other:6.1} ns/vertex ({:.2}x)", ns_other / ns[0]);
+        }
     }
 }

@@ -1,10 +1,15 @@
 //! Inputs at the edge of what numbers can hold: each must neither panic nor bias, and the tree must accept what
 //! testing every vertex in f64 accepts.
+//!
+//! Elsewhere: leaves uniform with tails to 1e-7 (`roulette`), skinny triangles and coplanar duplicates (`visibility`,
+//! `ray_offset`), the furnace at every roughness (`bsdf/energy`), any bytes (`fuzz`).
+
+mod numbers;
 
 use crate::roulette::{hits, lit_lobe, random_frame, surface_points, u};
 use glam::{DVec3, Vec3};
 use hrr::math::Frame;
-use hrr::roulette::{Lobe, MinimumRandom, Query, QueryCounters, probability, query};
+use hrr::roulette::{Lobe, Query, QueryCounters, probability, query};
 use hrr::sampler::counter::mix;
 use hrr::vertex_bvh::VertexBvh;
 
@@ -41,6 +46,7 @@ fn roughness_from_1_to_1e_minus_7() {
 
 #[test]
 fn grazing_view_down_to_a_cosine_of_1e_minus_6() {
+    let mut total = 0;
     for cos in [1e-2, 1e-4, 1e-6, 1e-9, 0.0] {
         let sin = (1.0f64 - cos * cos).sqrt();
         let wo = DVec3::new(sin * 0.6, sin * 0.8, cos);
@@ -64,11 +70,13 @@ fn grazing_view_down_to_a_cosine_of_1e_minus_6() {
                 let bvh = tree(&points);
                 let constant = 0.1 / lobe.weight();
                 for key in 0..10 {
-                    accepted(&bvh, &Query::new(DVec3::ZERO, &[lobe], constant, key));
+                    total += accepted(&bvh, &Query::new(DVec3::ZERO, &[lobe], constant, key)).len();
                 }
             }
         }
     }
+    // Lobes narrower than f32 resolves at distance 1 accept next to nothing.
+    assert!(total > 2000, "{total}");
 }
 
 #[test]
@@ -126,7 +134,7 @@ fn identical(n: usize) {
     let lobe = [Lobe::sphere(1.0)];
     let p = 5000.0 / n as f64;
     let constant = p * (points[0].as_dvec3()).length_squared();
-    let count = hits(&bvh, &Query::new(DVec3::ZERO, &lobe, constant, 3), false).0.len();
+    let count = accepted(&bvh, &Query::new(DVec3::ZERO, &lobe, constant, 3)).len();
     assert!((count as f64 - 5000.0).abs() < 5.0 * 5000f64.sqrt(), "{count}");
 }
 
@@ -153,6 +161,7 @@ fn all_vertices_on_a_line_or_in_a_plane() {
         }
         for points in [line, plane] {
             let bvh = tree(&points);
+            let mut total = 0;
             // Along the axis, from a place on the line: in the plane, and grazing it.
             for alpha in [1e-1, 1e-4, 1e-6] {
                 let mut direction = DVec3::ZERO;
@@ -162,9 +171,12 @@ fn all_vertices_on_a_line_or_in_a_plane() {
                     .into_iter()
                     .enumerate()
                 {
-                    accepted(&bvh, &Query::new(z, &lobe, 1e-3, key as u64));
+                    for constant in [1e-3, 1.0 / (alpha * alpha)] {
+                        total += accepted(&bvh, &Query::new(z, &lobe, constant, key as u64)).len();
+                    }
                 }
             }
+            assert!(total > 1000, "{total}");
         }
     }
 }
@@ -279,57 +291,13 @@ fn flushing_to_zero(work: impl FnOnce()) {
 fn flush_to_zero_changes_nothing() {
     let (points, z, lobe) = lit_lobe(2000, 1e-4, 1e-4, 5);
     let bvh = tree(&points);
-    let sets =
-        || (0..50).map(|key| hits(&bvh, &Query::new(z, &[lobe], 1e-9, key), false).0).collect::<Vec<_>>();
+    let sets = || (0..50).map(|key| accepted(&bvh, &Query::new(z, &[lobe], 1e-9, key))).collect::<Vec<_>>();
     let plain = sets();
     assert!(plain.iter().map(Vec::len).sum::<usize>() > 50);
     flushing_to_zero(|| {
         assert_eq!(sets(), plain);
         denormal_and_huge_coordinates();
     });
-}
-
-#[test]
-fn depth_60_trees_and_counts_to_2_to_the_31() {
-    // A chain that hands one leaf aside and keeps the rest, 60 deep, over 2^31 leaves and more.
-    for rule in [MinimumRandom::Nested, MinimumRandom::SemiStratified, MinimumRandom::Exact] {
-        let (n, mut seen) = (1u64 << 31, [0u64; 4]);
-        for key in 0..20_000u64 {
-            let mut node = rule.root(mix(key), n as f64);
-            assert!(node.xi > 0.0 && node.xi < 1e-7);
-            let mut left = n as u32;
-            for depth in 0..60u64 {
-                let counts = if depth % 2 == 0 { [1, left - 1] } else { [left / 2, left - left / 2] };
-                let mut children = [node; 2];
-                rule.split(node, mix(key ^ mix(depth)), &counts, &mut children);
-                for child in children {
-                    assert!(
-                        child.xi >= node.xi && child.xi <= 1.0,
-                        "{rule:?} depth {depth}: {child:?} below {node:?}"
-                    );
-                }
-                if counts[0] == 1 {
-                    for (decade, seen) in seen.iter_mut().enumerate() {
-                        *seen += u64::from(children[0].xi < 10f64.powi(-(decade as i32) - 1));
-                    }
-                }
-                node = children[1];
-                left = counts[1];
-                if left < 4 {
-                    break;
-                }
-            }
-        }
-        // Leaves aside at even depths, 20 000 keys: a tenth below 0.1, and so on.
-        let leaves = seen[0] as f64 * 10.0;
-        for (decade, &count) in seen.iter().enumerate() {
-            let mean = leaves * 0.1f64.powi(decade as i32 + 1);
-            assert!(
-                (count as f64 - mean).abs() < 5.0 * mean.sqrt() + 0.05 * mean,
-                "{rule:?} {decade}: {seen:?}"
-            );
-        }
-    }
 }
 
 #[test]

@@ -2,6 +2,7 @@
 
 mod loading;
 mod hard_cases;
+mod fuzz;
 mod roulette;
 mod vertex_bvh;
 mod support;

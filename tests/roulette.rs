@@ -1,5 +1,7 @@
 //! The roulette: its numbers, its accepted sets, its sums.
 
+mod pregenerated;
+
 use glam::{DVec3, Vec3};
 use hrr::math::Frame;
 use hrr::roulette::min_random::Minimum;

@@ -245,3 +245,24 @@ fn broken_meshes_and_missing_backends_are_errors() {
         assert!(error.to_string().contains("'embree'"), "{error}");
     }
 }
+
+#[test]
+fn a_triangle_that_is_there_twice_is_hit_once() {
+    let mut random = Random::new(7);
+    let single = ball(4);
+    let mut double = single.clone();
+    double.triangles.extend_from_slice(&single.triangles);
+    double.materials.extend_from_slice(&single.materials);
+    for (&backend, (_, twice)) in BACKENDS.iter().zip(built(&double)) {
+        let once = build(backend, &single, 1).unwrap();
+        let mut hits = 0;
+        for _ in 0..2000 {
+            let ray = random_ray(&mut random, 1.0);
+            let (a, b) = (once.intersect(&ray), twice.intersect(&ray));
+            assert_eq!(a.map(|h| h.t), b.map(|h| h.t), "{backend:?} {ray:?}");
+            assert_eq!(once.occluded(&ray), twice.occluded(&ray), "{backend:?} {ray:?}");
+            hits += usize::from(a.is_some());
+        }
+        assert!(hits > 200, "{hits}");
+    }
+}

@@ -30,6 +30,7 @@ pub fn light_vertices(n: usize) -> Vec<Vec3> {
 }
 
 /// An eye vertex on the mirror.
+#[derive(Clone)]
 pub struct EyeVertex {
     pub position: DVec3,
     pub lobes: [Lobe; 1],
@@ -39,8 +40,6 @@ pub struct EyeVertex {
 /// Eye vertices on the mirror y = 1 as a camera at (0, -0.9, 0.2) sees it; neighbours in the list are neighbours on
 /// the mirror, as in an image.
 pub fn eye_vertices(n: usize, alpha_x: f64, alpha_y: f64) -> Vec<EyeVertex> {
-    let eye = DVec3::new(0.0, -0.9, 0.2);
-    let normal = Frame { x: DVec3::X, y: DVec3::Z, z: DVec3::NEG_Y };
     let width = (n as f64).sqrt() as u64;
     (0..n as u64)
         .map(|i| {
@@ -48,18 +47,29 @@ pub fn eye_vertices(n: usize, alpha_x: f64, alpha_y: f64) -> Vec<EyeVertex> {
             let w = width as f64;
             let position =
                 DVec3::new((column + u(i, 6)) / w * 1.6 - 0.8, 1.0, (row + u(i, 7)) / w * 0.8 - 0.8);
-            let wo = (eye - position).normalize();
-            let lobes = [Lobe::from_ggx_reflection(&normal, wo, alpha_x, alpha_y, 1.0)];
-            EyeVertex { position, lobes, key: mix(i) }
+            eye_vertex(position, alpha_x, alpha_y, mix(i))
         })
         .collect()
 }
 
-/// Processor seconds that this thread has had: what it took from its neighbours' point of view does not count.
+/// The eye vertex in a place on the mirror.
+pub fn eye_vertex(position: DVec3, alpha_x: f64, alpha_y: f64, key: u64) -> EyeVertex {
+    let normal = Frame { x: DVec3::X, y: DVec3::Z, z: DVec3::NEG_Y };
+    let wo = (DVec3::new(0.0, -0.9, 0.2) - position).normalize();
+    EyeVertex { position, lobes: [Lobe::from_ggx_reflection(&normal, wo, alpha_x, alpha_y, 1.0)], key }
+}
+
+/// Processor seconds that this thread has had: what its neighbours took does not count. (`/proc`'s schedstat moves in
+/// steps of 4 ms, and the best of many runs would be the one that lost a step.)
 pub fn cpu_seconds() -> f64 {
-    let read = || {
-        std::fs::read_to_string("/proc/thread-self/schedstat").ok()?.split(' ').next()?.parse::<f64>().ok()
-    };
-    static START: std::sync::OnceLock<std::time::Instant> = std::sync::OnceLock::new();
-    read().map_or_else(|| START.get_or_init(std::time::Instant::now).elapsed().as_secs_f64(), |ns| ns * 1e-9)
+    #[cfg(unix)]
+    {
+        let now = rustix::time::clock_gettime(rustix::time::ClockId::ThreadCPUTime);
+        now.tv_sec as f64 + now.tv_nsec as f64 * 1e-9
+    }
+    #[cfg(not(unix))]
+    {
+        static START: std::sync::OnceLock<std::time::Instant> = std::sync::OnceLock::new();
+        START.get_or_init(std::time::Instant::now).elapsed().as_secs_f64()
+    }
 }

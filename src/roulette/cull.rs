@@ -63,6 +63,11 @@ fn start(
         walk.lobes[walk.count] = lobe;
         walk.count += 1;
     }
+    if let Some(numbers) = query.pregenerated {
+        // Another tree's minima bound nothing here.
+        walk.cull &= numbers.len() == bvh.len();
+        return dispatch!(Level::new(), simd => walk.run(simd, root, numbers));
+    }
     let key = query.key;
     match query.rule {
         MinimumRandom::Nested => dispatch!(Level::new(), simd => walk.run(simd, root, Nested { key })),

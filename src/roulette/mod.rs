@@ -19,7 +19,7 @@ mod plane;
 
 pub use cull::{MAX_LOBES, query, query_brute_force};
 pub use lobe::{Lobe, Range};
-pub use min_random::MinimumRandom;
+pub use min_random::{MinimumRandom, Pregenerated};
 
 use glam::DVec3;
 
@@ -38,12 +38,16 @@ pub struct Query<'a> {
     pub mask: u32,
     /// The rule for minimum random numbers.
     pub rule: MinimumRandom,
+    /// Numbers shared with other queries, in place of those that `key` and `rule` would deal: for comparison. Without
+    /// use for culling, but still unbiased, when made for a tree of another size.
+    pub pregenerated: Option<&'a Pregenerated>,
 }
 
 impl<'a> Query<'a> {
     /// A query over all vertices with the default rule.
     pub fn new(position: DVec3, lobes: &'a [Lobe], constant: f64, key: u64) -> Self {
-        Self { position, lobes, constant, key, mask: u32::MAX, rule: MinimumRandom::default() }
+        let (mask, rule, pregenerated) = (u32::MAX, MinimumRandom::default(), None);
+        Self { position, lobes, constant, key, mask, rule, pregenerated }
     }
 }
 
