@@ -330,8 +330,8 @@ fn start(place: &Place, flags: &str) -> (std::process::Child, impl Iterator<Item
 
 #[cfg(unix)]
 fn interrupt(child: &std::process::Child) {
-    let status = Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap();
-    assert!(status.success());
+    use rustix::process::{Pid, Signal, kill_process};
+    kill_process(Pid::from_child(child), Signal::INT).unwrap();
 }
 
 #[cfg(unix)]

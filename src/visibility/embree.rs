@@ -1,7 +1,7 @@
 //! Intel Embree behind the [`Visibility`] trait.
 //!
 //! Embree's `f32` arithmetic finds candidates; whether one lies within the ray's interval is decided in `f64`
-//! ([`Triangles::meets`]). So no ray is stopped by the surface that it leaves or ends at, however thin, distant or large
+//! (`Triangles::meets`). So no ray is stopped by the surface that it leaves or ends at, however thin, distant or large
 //! Embree's own rounding makes that surface.
 //!
 //! Embree takes numbers below 1e-18 for 0 and drops triangles beyond 1.8e18. So it is given meshes of size 1 and
