@@ -78,8 +78,8 @@ fn against_testing_all() {
     let points = light_vertices(1_000_000);
     let mut bvh = VertexBvh::new();
     bvh.build(&points).unwrap();
-    let eyes = eye_vertices(20_000, 1e-3, 1e-3);
-    let c = hrr::roulette::constant_for(0.35, 24.0, points.len());
+    let eyes = eye_vertices(20_000, 1e-2, 1e-2);
+    let c = hrr::roulette::constant_for(1.9, 24.0, points.len());
     let queries: Vec<_> = eyes.iter().map(|e| Query::new(e.position, &e.lobes, c, e.key)).collect();
     let tree = best(&bvh, &queries);
     row("tree", tree);

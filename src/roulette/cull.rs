@@ -11,7 +11,7 @@ pub const MAX_LOBES: usize = 8;
 
 /// Nodes of one level that are taken up together. They are independent work for the processor, which a chain of
 /// single visits, each as long as its latencies, is not.
-const CHUNK: usize = 4;
+const CHUNK: usize = 8;
 
 /// A chunk's children are done before its siblings, so each level has at most those waiting; stores write eight
 /// entries at a time.

@@ -190,27 +190,19 @@ impl<S: Simd> Box8<S> {
         x.max(y).max(z)
     }
 
-    /// A point of each box near the lobe's axis, in the lobe's metric: coordinates descend in turn, twice.
+    /// A point of each box near the lobe's axis, in the lobe's metric: coordinates descend in turn, once. A second round
+    /// saves a sixth of the visits at best and takes as long as it saves.
     #[inline(always)]
     fn nearest_to_axis(self, lobe: &FlatLobe) -> Vec8<S> {
         let (c, e) = (self.center, self.half);
-        let below = Vec8 { x: -e.x, y: -e.y, z: -e.z };
         let [fx, fy, fz] = lobe.follow;
-        // u: how far the point is off its best place along each axis; d: its displacement from the centre.
-        let (ux, uy, uz) = (c.dot_row(fx), c.dot_row(fy), c.dot_row(fz));
-        let dx = (-ux).max(below.x).min(e.x);
-        let (uy, uz) = (dx.mul_add(fy[0], uy), dx.mul_add(fz[0], uz));
-        let dy = (-uy).max(below.y).min(e.y);
-        let (ux, uz) = (dy.mul_add(fx[1], dx + ux), dy.mul_add(fz[1], uz));
-        let dz = (-uz).max(below.z).min(e.z);
-        let (ux, uy) = (dz.mul_add(fx[2], ux), dz.mul_add(fy[2], dy + uy));
-        let x = (dx - ux).max(below.x).min(e.x);
-        let step = x - dx;
-        let (uy, uz) = (step.mul_add(fy[0], uy), step.mul_add(fz[0], dz + uz));
-        let y = (dy - uy).max(below.y).min(e.y);
-        let uz = (y - dy).mul_add(fz[1], uz);
-        let z = (dz - uz).max(below.z).min(e.z);
-        Vec8 { x: c.x + x, y: c.y + y, z: c.z + z }
+        // u: how far the point is off its best place along an axis; d: its displacement from the centre.
+        let dx = (-c.dot_row(fx)).max(-e.x).min(e.x);
+        let uy = dx.mul_add(fy[0], c.dot_row(fy));
+        let dy = (-uy).max(-e.y).min(e.y);
+        let uz = dy.mul_add(fz[1], dx.mul_add(fz[0], c.dot_row(fz)));
+        let dz = (-uz).max(-e.z).min(e.z);
+        Vec8 { x: c.x + dx, y: c.y + dy, z: c.z + dz }
     }
 
     /// The least value that the plane supporting `h` at `p` takes over the box.

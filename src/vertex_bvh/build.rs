@@ -14,7 +14,7 @@ pub(super) struct Scratch {
 }
 
 /// Vertices that one task handles at a time.
-const GRAIN: usize = 4096;
+const GRAIN: usize = 2048;
 
 impl VertexBvh {
     /// Builds the tree over positions (relative to whatever origin keeps them precise), on the current rayon pool.
@@ -28,6 +28,11 @@ impl VertexBvh {
     /// As [`VertexBvh::build`], with a mask for each vertex: queries pass over vertices whose mask shares no bit
     /// with their own.
     pub fn build_masked(&mut self, positions: &[Vec3], masks: Option<&[u32]>) -> Result<()> {
+        // The whole build on a thread of the pool: handing it each step by itself would take longer than small trees do.
+        rayon::scope(|_| self.build_here(positions, masks))
+    }
+
+    fn build_here(&mut self, positions: &[Vec3], masks: Option<&[u32]>) -> Result<()> {
         self.clear();
         if positions.len() > MAX_VERTICES {
             return Err(Error::Input(format!("{} light vertices: at most 2^31 fit a tree", positions.len())));

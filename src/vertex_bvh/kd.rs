@@ -12,18 +12,18 @@ pub(super) struct Placed {
 }
 
 impl Placed {
-    /// Sorts as the coordinate and, where that is equal, as the index: a total order, so that the tree does not
-    /// depend on how the work was shared out.
+    /// Sorts as the coordinate along an axis and, where that is equal, as the index: a total order, so that the tree
+    /// does not depend on how the work was shared out.
     #[inline(always)]
-    fn key(&self, axis: usize) -> u64 {
-        let bits = self.position[axis].to_bits();
+    fn key<const AXIS: usize>(&self) -> u64 {
+        let bits = self.position.to_array()[AXIS].to_bits();
         let ordered = bits ^ ((bits as i32 >> 31) as u32 | 0x8000_0000);
         u64::from(ordered) << 32 | u64::from(self.index)
     }
 }
 
 /// Vertices below which a task is not worth handing to another thread.
-const GRAIN: usize = 1 << 13;
+const GRAIN: usize = 1 << 11;
 
 /// Puts vertices into tree order.
 pub(super) fn order(vertices: &mut [Placed]) {
@@ -44,7 +44,12 @@ fn split(vertices: &mut [Placed], child: usize) {
     }
     let middle = vertices.len().div_ceil(child).div_ceil(2) * child;
     let axis = widest(vertices);
-    vertices.select_nth_unstable_by_key(middle, |v| v.key(axis));
+    // The axis as a constant makes the comparisons twice as fast.
+    match axis {
+        0 => vertices.select_nth_unstable_by_key(middle, Placed::key::<0>),
+        1 => vertices.select_nth_unstable_by_key(middle, Placed::key::<1>),
+        _ => vertices.select_nth_unstable_by_key(middle, Placed::key::<2>),
+    };
     let (low, high) = vertices.split_at_mut(middle);
     if low.len() + high.len() > GRAIN {
         rayon::join(|| split(low, child), || split(high, child));
@@ -71,7 +76,7 @@ mod tests {
 
     #[test]
     fn keys_sort_as_numbers() {
-        let at = |x: f32| Placed { position: Vec3::new(x, 0.0, 0.0), index: 0 }.key(0);
+        let at = |x: f32| Placed { position: Vec3::new(x, 0.0, 0.0), index: 0 }.key::<0>();
         let numbers = [f32::MIN, -2.0, -1e-40, -0.0, 0.0, 1e-40, 1.0, f32::MAX];
         assert!(numbers.windows(2).all(|w| at(w[0]) < at(w[1])));
     }
