@@ -14,7 +14,7 @@ mod workload;
 use hrr::film::Film;
 use hrr::math::luminance;
 use hrr::scene::Scene;
-use hrr::settings::{Heuristic, Integrator, Settings};
+use hrr::settings::{Guiding, Heuristic, Integrator, Settings};
 use hrr::subpath::World;
 use hrr::visibility::{Hit, Ray, Visibility};
 use std::path::Path;
@@ -53,7 +53,7 @@ impl<'a> Contender<'a> {
     fn new(name: &str, world: &'a World<'a>, settings: &'a Settings) -> Self {
         Self {
             name: format!("{name}, {} light subpaths, {} samples", settings.light_subpaths, settings.samples),
-            integrator: hrr::integrator::new(world, settings),
+            integrator: hrr::integrator::new(world, settings).expect("a light pass"),
             film: Film::new(&world.scene.film),
             iterations: 0,
             seconds: 0.0,
@@ -89,6 +89,7 @@ fn caustic(name: &str, seconds: f64, light_subpaths: u64, samples: u32) {
         Settings { integrator: Integrator::LvcHrr, light_subpaths, samples, ..scene.settings.clone() };
     let large = Settings { integrator: Integrator::Lvc, ..roulette.clone() };
     let small = Settings { light_subpaths: 0, samples: 1, ..large.clone() };
+    let plain = Settings { guiding: Guiding::Off, ..roulette.clone() };
     let power = Settings { mis: Heuristic::Power, ..roulette.clone() };
     let seeds = [1, 2].map(|seed| Settings { seed, ..roulette.clone() });
     let world = World::new(&scene, &roulette).expect("a world");
@@ -109,11 +110,12 @@ fn caustic(name: &str, seconds: f64, light_subpaths: u64, samples: u32) {
         Contender::new("lvc", &world, &large),
         Contender::new("lvc+hrr", &world, &roulette),
         Contender::new("lvc+hrr, power heuristic", &world, &power),
+        Contender::new("lvc+hrr, unguided", &world, &plain),
         Contender::new("reference", &world, &seeds[0]),
         Contender::new("reference", &world, &seeds[1]),
     ];
     // References get twice the time each.
-    let share = |i: usize| if i < 4 { 1.0 } else { 2.0 };
+    let share = |i: usize| if i < 5 { 1.0 } else { 2.0 };
     while let Some((_, next)) = runs
         .iter_mut()
         .enumerate()
@@ -122,7 +124,7 @@ fn caustic(name: &str, seconds: f64, light_subpaths: u64, samples: u32) {
     {
         next.iterate();
     }
-    let [a, b] = [4, 5].map(|i| runs[i].luminances(&pixels));
+    let [a, b] = [5, 6].map(|i| runs[i].luminances(&pixels));
     let reference: Vec<f64> = a.iter().zip(&b).map(|(a, b)| (a + b) / 2.0).collect();
     let noise = mse(&a, &b).map(|d| d / 4.0);
     println!(
@@ -135,7 +137,7 @@ fn caustic(name: &str, seconds: f64, light_subpaths: u64, samples: u32) {
         [0, 1, 2].map(|k| measured[k] - noise[k])
     };
     let ours = errors(&runs[2]);
-    for run in &runs[..4] {
+    for run in &runs[..5] {
         let [all, trimmed, median] = errors(run);
         println!(
             "  {:66} {:4} iterations, {:5.1} s: MSE {all:.3e} (x{:.2}), without the worst 1 % {trimmed:.3e} (x{:.2}), \
@@ -179,12 +181,15 @@ fn rays() {
         let inner = hrr::visibility::build(settings.visibility, &scene.mesh, 1).expect("a backend");
         recorded.visibility = Box::new(Recorder { inner, rays: rays.clone() });
         let mut film = Film::new(&scene.film);
-        hrr::integrator::new(&recorded, &settings).iterate(0, &mut film, &|_| ()).expect("an iteration");
+        hrr::integrator::new(&recorded, &settings)
+            .expect("pt")
+            .iterate(0, &mut film, &|_| ())
+            .expect("an iteration");
         drop(recorded);
         let rays = rays.lock().expect("no panics");
 
         let world = World::new(&scene, &settings).expect("a world");
-        let mut tracer = hrr::integrator::new(&world, &settings);
+        let mut tracer = hrr::integrator::new(&world, &settings).expect("pt");
         #[cfg(feature = "embree")]
         let bare = bare_embree::Bare::new(&scene.mesh);
         // This thread's processor time, so that other programs on the machine do not count.

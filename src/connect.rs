@@ -87,7 +87,8 @@ impl EyeVertex {
             return *throughput * radiance; // no other technique sees emitters directly
         }
         let heuristic = techniques.heuristic;
-        let total = heuristic.total(side, self.m_emitter, emitter.pdf_w(vertex.wo), 0.0);
+        let total =
+            heuristic.total(side, self.m_emitter, techniques.emission_pdf_w(&emitter, vertex.wo), 0.0);
         let e = heuristic.others(emitter.pdf_a, total);
         *throughput * radiance * heuristic.weight(0.0, techniques.eye_hits, e)
     }
@@ -116,7 +117,8 @@ impl EyeVertex {
         }
         let (heuristic, m) = (techniques.heuristic, techniques.next_event);
         let l = per_area(pdf_w, cos_light, edge.distance2) * techniques.eye_hits / emitter.pdf_a;
-        let e = self.others(techniques, per_area(emitter.pdf_w(-edge.w), cos, edge.distance2), edge.w);
+        let emission = techniques.emission_pdf_w(&emitter, -edge.w);
+        let e = self.others(techniques, per_area(emission, cos, edge.distance2), edge.w);
         let value = value * (heuristic.weight(heuristic.raise(l), m, e) / emitter.pdf_a);
         Some((value, offset::between(&vertex.point, &emitter.point)))
     }

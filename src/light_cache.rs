@@ -87,6 +87,11 @@ impl LightCache {
         self.starts[index] as usize..self.starts[index + 1] as usize
     }
 
+    /// The subpath that a vertex belongs to.
+    pub fn subpath_of(&self, vertex: usize) -> usize {
+        self.starts.partition_point(|&start| start as usize <= vertex) - 1
+    }
+
     /// Number of vertices in the first `subpaths` subpaths.
     pub fn end_of(&self, subpaths: u64) -> usize {
         let last = (self.starts.len() - 1).min(usize::try_from(subpaths).unwrap_or(usize::MAX));

@@ -1,18 +1,20 @@
 //! How often each technique tries a path, and with which lobes the roulette judges light vertices.
 
 use crate::bsdf::Transport;
+use crate::light::{EmissionGuide, EmitterPoint};
 use crate::math::luminance;
 use crate::mis::Heuristic;
 use crate::roulette::{self, Lobe};
 use crate::sampler::Sampler;
 use crate::subpath::walk::Walk;
-use crate::subpath::{Vertex, World};
+use crate::subpath::{Vertex, World, from_light};
 use glam::DVec3;
 use std::ops::Deref;
+use std::sync::Arc;
 
 /// How often each technique tries a path, per eye sample: the m of docs/theory.md section 6. A technique that is off
 /// has 0.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 pub struct Techniques {
     /// How they share a path.
     pub heuristic: Heuristic,
@@ -28,6 +30,8 @@ pub struct Techniques {
     pub roulette: Option<Roulette>,
     /// How light vertices are merged with eye vertices.
     pub merging: Option<Merging>,
+    /// Where light subpaths are sent; `None`: by the cosine.
+    pub guide: Option<Arc<EmissionGuide>>,
 }
 
 /// Vertex merging: light vertices near an eye vertex count as if they were it.
@@ -101,6 +105,7 @@ impl Techniques {
             base: 0.0,
             roulette: None,
             merging: None,
+            guide: None,
         }
     }
 
@@ -155,6 +160,19 @@ impl Techniques {
         } else {
             self.connection(&self.lobes(&light.vertex, w_eye), light.to_previous())
         }
+    }
+
+    /// Density of a light subpath's first direction, 1/sr.
+    pub fn emission_pdf_w(&self, emitter: &EmitterPoint, direction: DVec3) -> f64 {
+        match &self.guide {
+            None => emitter.pdf_w(direction),
+            Some(guide) => guide.pdf_w(emitter, direction),
+        }
+    }
+
+    /// Starts a light subpath.
+    pub fn emit(&self, world: &World<'_>, sampler: &Sampler) -> Option<Walk> {
+        from_light::emit(world, self.heuristic, self.guide.as_deref(), sampler, self.eye_hits)
     }
 
     /// eta at vertices that are not delta; 0 without merging.

@@ -83,7 +83,7 @@ fn a_furnace_is_evenly_bright() {
     for (name, left) in [("diffuse furnace", diffuse(0.5)), ("furnace with a mirror", mirror)] {
         let materials = vec![lit("wall", diffuse(0.5), 1.0), lit("left", left, 1.0)];
         let scene = in_memory(room([0, 1]), materials, DVec3::new(0.3, 0.1, 0.8), DVec3::NEG_X, 60.0);
-        let settings = Settings { iterations: 64, samples: 192, merge_radius: 0.01, ..Settings::default() };
+        let settings = Settings { iterations: 64, samples: 64, merge_radius: 0.01, ..Settings::default() };
         // What comes by way of the mirror, light tracing does not see.
         let without = if name == "diffuse furnace" { &[][..] } else { &[Integrator::Lt] };
         check(name, &small(scene), &settings, without, 2.0);

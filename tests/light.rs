@@ -6,7 +6,7 @@ use crate::support::distribution::{Distribution, Outcome};
 use crate::support::stats::{Family, Moments};
 use glam::{DVec2, DVec3, Vec3};
 use hrr::geometry::{Mesh, SurfacePoint};
-use hrr::light::Lights;
+use hrr::light::{EmissionGuide, Lights};
 use hrr::material::Material;
 use hrr::math::{Spectrum, luminance};
 use std::f64::consts::PI;
@@ -125,6 +125,34 @@ fn directions_are_drawn_as_their_density_says() {
         assert!(wrong_side.p < 1e-6);
     }
     family.assert();
+}
+
+/// Guided emission: useful directions come often, each as its density says, and all of the power is still there.
+#[test]
+fn guided_directions_carry_the_same_power() {
+    let (mesh, materials) = (mesh(), materials());
+    let lights = Lights::new(&mesh, &materials);
+    for triangle in [1, 3] {
+        let emitter = lights.at(&SurfacePoint::at_barycentric(&mesh, triangle, 0.2, 0.3)).unwrap();
+        let useful = emitter.sample_direction(DVec2::new(0.8, 0.3)).unwrap();
+        let guide = EmissionGuide::learn(&lights, [(emitter, useful, 2.0)].into_iter()).unwrap();
+        let mut rng = Random::new(75);
+        let (mut near, mut inverse, mut sides) = (Moments::default(), Moments::default(), Moments::default());
+        for _ in 0..400_000 {
+            let w = emitter.sample_direction(guide.warp(&emitter, rng.u2())).unwrap();
+            near.push(f64::from(w.dot(useful) > 0.99));
+            // The mean of 1/density is the measure of all directions: the hemisphere, or both of them.
+            inverse.push(emitter.pdf_w(w) / guide.pdf_w(&emitter, w));
+            sides.push(emitter.pdf_w(w) / guide.pdf_w(&emitter, w) * w.dot(useful));
+        }
+        assert!(near.mean() > 0.5, "{}", near.mean());
+        assert!(inverse.z_test(1.0, 0.0) > 1e-5, "{}", inverse.mean());
+        // The cosine lobe's mean direction is 2/3 along the normal; both sides cancel.
+        let expected = if emitter.two_sided { 0.0 } else { 2.0 / 3.0 * emitter.point.ng.dot(useful) };
+        assert!(sides.z_test(expected, 0.0) > 1e-5, "{} {expected}", sides.mean());
+    }
+    let nothing = std::iter::empty();
+    assert!(EmissionGuide::learn(&lights, nothing).is_none());
 }
 
 /// Emission through a point and a direction, over their densities, has the mean pi L A for each side that emits.

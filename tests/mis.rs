@@ -6,15 +6,16 @@ use crate::support::scenes;
 use glam::{DVec2, DVec3};
 use hrr::bsdf::Transport;
 use hrr::connect::{EyeVertex, connect_camera};
-use hrr::light::EmitterPoint;
+use hrr::light::{EmissionGuide, EmitterPoint};
 use hrr::math::Spectrum;
 use hrr::mis::Heuristic;
 use hrr::sampler::{Purpose, Sampler, Stream};
 use hrr::settings::{Backend, Settings};
 use hrr::subpath::walk::Start;
-use hrr::subpath::{Vertex, Walk, World, from_light};
+use hrr::subpath::{Vertex, Walk, World};
 use hrr::techniques::{Merging, Roulette, Techniques};
 use hrr::visibility::offset;
+use std::sync::Arc;
 
 /// Numbers with no special relation to each other.
 const TECHNIQUES: Techniques = Techniques {
@@ -25,6 +26,7 @@ const TECHNIQUES: Techniques = Techniques {
     base: 1.7,
     roulette: Some(Roulette { light_subpaths: 1400.0, constant: 0.02, max_alpha: 0.3 }),
     merging: Some(Merging { light_subpaths: 1400.0, radius: 0.01 }),
+    guide: None,
 };
 
 /// A whole path: a point on an emitter, surface vertices from the light's side, the camera.
@@ -75,7 +77,7 @@ impl Path {
         let delta = |i: usize| i >= 1 && i <= k - 2 && self.surfaces[i - 1].bsdf.is_delta();
         let fw = |i: usize| match i {
             0 => self.emitter.pdf_a,
-            1 => self.emitter.pdf_w(self.to(world, 0, 1)) * self.g(world, 0, 1),
+            1 => t.emission_pdf_w(&self.emitter, self.to(world, 0, 1)) * self.g(world, 0, 1),
             _ => self.pdf_w(world, i - 1, i - 2, i) * self.g(world, i - 1, i),
         };
         let rv = |i: usize| {
@@ -120,7 +122,7 @@ impl Path {
 
 fn light_walks(world: &World<'_>, t: &Techniques, sampler: &Sampler, length: usize) -> Vec<Walk> {
     let mut walks = Vec::new();
-    let mut walk = from_light::emit(world, t.heuristic, sampler, t.eye_hits);
+    let mut walk = t.emit(world, sampler);
     while let Some(light) = walk.filter(|_| walks.len() < length) {
         walks.push(light);
         walk = t.next_light(world, &light, sampler);
@@ -164,22 +166,32 @@ fn close(what: &str, by_recursion: f64, by_definition: f64) {
 
 #[test]
 fn recursion_equals_the_definition() {
-    for heuristic in Heuristic::ALL {
-        check(&Techniques { heuristic, ..TECHNIQUES });
-    }
-}
-
-fn check(t: &Techniques) {
     let scene = scenes::box_of_everything();
     let settings = Settings { visibility: Backend::Obvhs, ..Settings::default() };
     let world = World::new(&scene, &settings).unwrap();
+    // Light that goes to one side is useful, and more so the farther.
+    let emitter = world.lights.sample_point(0.3, DVec2::splat(0.5)).unwrap();
+    let observations = (1..100).map(|i| {
+        let direction = emitter.sample_direction(DVec2::new(f64::from(i) / 130.0, 0.2)).unwrap();
+        (emitter, direction, f64::from(i))
+    });
+    let guide = EmissionGuide::learn(&world.lights, observations).map(Arc::new);
+    assert!(guide.is_some());
+    for heuristic in Heuristic::ALL {
+        for guide in [None, guide.clone()] {
+            check(&world, &Techniques { heuristic, guide, ..TECHNIQUES });
+        }
+    }
+}
+
+fn check(world: &World<'_>, t: &Techniques) {
     let mut checked = [0usize; 5];
     let mut with_delta = 0;
     for index in 0..12_000u64 {
         let eye_sampler = Sampler::new(1, 0, Stream::Eye, index);
         let light_sampler = Sampler::new(1, 0, Stream::Light, index);
-        let lights = light_walks(&world, t, &light_sampler, (index % 5) as usize);
-        let eyes = eye_walks(&world, t, &eye_sampler, (index / 5 % 5) as usize);
+        let lights = light_walks(world, t, &light_sampler, (index % 5) as usize);
+        let eyes = eye_walks(world, t, &eye_sampler, (index / 5 % 5) as usize);
         // The emitter that the light walk started from is drawn by the same numbers again.
         let start = world
             .lights
@@ -204,14 +216,14 @@ fn check(t: &Techniques) {
                 let radiance = emitter.radiance(last.walk.vertex.wo);
                 if radiance != Spectrum::ZERO && !before.is_empty() {
                     let path = path(emitter, &[], before);
-                    let got = last.emitted(&world, t).x / (last.walk.throughput.x * radiance.x);
-                    close("s = 0", got, path.weight(&world, t, 0, 0));
+                    let got = last.emitted(world, t).x / (last.walk.throughput.x * radiance.x);
+                    close("s = 0", got, path.weight(world, t, 0, 0));
                     count(0, &path);
                 }
             }
             // s = 1: next-event estimation.
             let delta = last.walk.vertex.bsdf.is_delta();
-            if let Some((value, _)) = last.next_event(&world, t, &eye_sampler).filter(|_| !delta) {
+            if let Some((value, _)) = last.next_event(world, t, &eye_sampler).filter(|_| !delta) {
                 let depth = last.walk.depth;
                 let emitter = world
                     .lights
@@ -222,12 +234,12 @@ fn check(t: &Techniques) {
                     .unwrap();
                 let path = path(emitter, &[], &eyes);
                 let x = &last.walk.vertex;
-                let w = path.to(&world, 1, 0);
+                let w = path.to(world, 1, 0);
                 let plain = last.walk.throughput
                     * x.factor(x.wo, w)
                     * emitter.radiance(-w)
-                    * (x.cos_ng(w) * path.g(&world, 1, 0) / emitter.pdf_a);
-                close("s = 1", value.x / plain.x, path.weight(&world, t, 0, 1));
+                    * (x.cos_ng(w) * path.g(world, 1, 0) / emitter.pdf_a);
+                close("s = 1", value.x / plain.x, path.weight(world, t, 0, 1));
                 count(1, &path);
             }
         }
@@ -248,14 +260,14 @@ fn check(t: &Techniques) {
                     * y.factor(-w, y.wo)
                     * light.throughput
                     * (z.cos_ng(w) * y.cos_ng(w) / offset.length_squared());
-                close("connection", value.x / plain.x, path.weight(&world, t, 0, s));
+                close("connection", value.x / plain.x, path.weight(world, t, 0, s));
                 count(2, &path);
             }
         }
         if let (Some(last), Some(eye)) = (lights.last(), eyes.last())
             && !last.vertex.bsdf.is_delta()
             && !eye.walk.vertex.bsdf.is_delta()
-            && let Some(light) = led_to(&world, t, last, &eye.walk.vertex)
+            && let Some(light) = led_to(world, t, last, &eye.walk.vertex)
         {
             // Merging where the eye walk ends, with a light walk that is led there.
             let path = path(start, &lights, &eyes);
@@ -264,22 +276,21 @@ fn check(t: &Techniques) {
             let value = eye.merge(t, merging, &light);
             let plain = eye.walk.throughput * z.factor(z.wo, y.wo) * light.throughput / merging.eta();
             if plain.x > 0.0 {
-                close("merging", value.x / plain.x, path.weight(&world, t, 1, lights.len() + 1));
+                close("merging", value.x / plain.x, path.weight(world, t, 1, lights.len() + 1));
                 count(4, &path);
             }
         }
         if let Some(light) = lights.last().filter(|w| !w.vertex.bsdf.is_delta())
-            && let Some((_, value, _)) = connect_camera(&world, t, light)
+            && let Some((_, value, _)) = connect_camera(world, t, light)
         {
             // s = k-1: seen by the camera.
             let path = path(start, &lights, &[]);
             let k = lights.len() + 2;
             let y = &light.vertex;
-            let w = path.to(&world, k - 2, k - 1);
-            let plain = light.throughput
-                * y.factor(w, y.wo)
-                * (path.g(&world, k - 1, k - 2) * world.camera.pdf_w(-w));
-            close("s = k-1", value.x / plain.x * t.light_image, path.weight(&world, t, 0, k - 1));
+            let w = path.to(world, k - 2, k - 1);
+            let plain =
+                light.throughput * y.factor(w, y.wo) * (path.g(world, k - 1, k - 2) * world.camera.pdf_w(-w));
+            close("s = k-1", value.x / plain.x * t.light_image, path.weight(world, t, 0, k - 1));
             count(3, &path);
         }
     }

@@ -1,6 +1,6 @@
 //! The settings table, the struct behind it and its TOML are one thing.
 
-use hrr::settings::{Backend, Heuristic, Integrator, Kind, Setting, Settings, TABLE};
+use hrr::settings::{Backend, Guiding, Heuristic, Integrator, Kind, Setting, Settings, TABLE};
 
 /// A value of each setting that is not its default. A new setting has no entry here yet: the tests say so.
 fn other_value(name: &str) -> &'static str {
@@ -11,6 +11,7 @@ fn other_value(name: &str) -> &'static str {
         "light_subpaths" => "1234",
         "connections" => "3",
         "expected" => "0.25",
+        "guiding" => "off",
         "mis" => "power",
         "reused_subpaths" => "50",
         "record_spacing" => "4",
@@ -53,6 +54,7 @@ fn every_field_has_its_row() {
         connections,
         expected,
         hrr_alpha,
+        guiding,
         mis,
         reused_subpaths,
         record_spacing,
@@ -66,7 +68,7 @@ fn every_field_has_its_row() {
     assert_eq!((threads, expected, hrr_alpha, mis), (2, 0.25, 0.125, Heuristic::Power));
     assert_eq!((merge_radius, merge_pixels, merge_shrink), (0.5, 5.0, 1.0));
     assert_eq!((reused_subpaths, record_spacing), (50, 4));
-    assert_eq!(TABLE.len(), 19);
+    assert_eq!((guiding, TABLE.len()), (Guiding::Off, 20));
 }
 
 #[test]

@@ -9,15 +9,17 @@ use crate::connect::{self, EyeVertex};
 use crate::error::Result;
 use crate::film::Film;
 use crate::light_cache::LightCache;
+use crate::material::Material;
 use crate::math::Spectrum;
 use crate::roulette::{self, Query};
 use crate::sampler::{Purpose, Sampler, Stream};
-use crate::settings::Settings;
-use crate::subpath::{Walk, World, from_light};
+use crate::settings::{Guiding, Settings};
+use crate::subpath::{Walk, World};
 use crate::tally::{Clock, Tally};
 use crate::techniques::{Merging, Roulette, Techniques};
 use crate::vertex_bvh::VertexBvh;
 use crate::visibility::Ray;
+use glam::DVec2;
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Instant;
@@ -31,21 +33,21 @@ const LIGHT_SHARE: f64 = 0.3;
 
 /// The machine, and the memory that it keeps between iterations.
 pub struct Bidirectional<'a> {
-    world: &'a World<'a>,
-    settings: &'a Settings,
+    pub(super) world: &'a World<'a>,
+    pub(super) settings: &'a Settings,
     recipe: Recipe,
-    techniques: Techniques,
-    light_subpaths: u64,
+    pub(super) techniques: Techniques,
+    pub(super) light_subpaths: u64,
     /// Radius of merging in the first iteration, world units.
     first_radius: f64,
-    cache: LightCache,
-    bvh: VertexBvh,
+    pub(super) cache: LightCache,
+    pub(super) bvh: VertexBvh,
     records: Records,
 }
 
 impl<'a> Bidirectional<'a> {
     /// Prepares a recipe: a pre-pass over light subpaths sets the constants of roulette and weights.
-    pub fn new(world: &'a World<'a>, settings: &'a Settings, recipe: Recipe) -> Self {
+    pub fn new(world: &'a World<'a>, settings: &'a Settings, recipe: Recipe) -> Result<Self> {
         let film = &world.scene.film;
         let samples = u64::from(film.width) * u64::from(film.height) * u64::from(settings.samples);
         let light_subpaths = match (recipe.base, settings.light_subpaths) {
@@ -63,12 +65,23 @@ impl<'a> Bidirectional<'a> {
             bvh: VertexBvh::new(),
             records: Records::default(),
         };
+        if recipe.roulette && settings.guiding == Guiding::On && !machine.nothing_glossy() {
+            machine.techniques.guide = machine.learn_guide()?;
+        }
         machine.techniques = machine.plan();
-        machine
+        Ok(machine)
+    }
+
+    /// Whether no material has lobes for the roulette.
+    fn nothing_glossy(&self) -> bool {
+        let limit = self.settings.hrr_alpha;
+        let glossy =
+            |m: &Material| m.bsdf(DVec2::ZERO).glossy().is_some_and(|g| g.alpha_x.max(g.alpha_y) <= limit);
+        !self.world.scene.materials.iter().any(glossy)
     }
 
     /// How often each technique tries, per eye sample.
-    fn plan(&self) -> Techniques {
+    pub(super) fn plan(&self) -> Techniques {
         let (recipe, n_l) = (&self.recipe, self.light_subpaths as f64);
         let eye_samples = f64::from(self.settings.samples);
         // The weights must not depend on an iteration's own number of vertices, hence a pre-pass of its own numbers.
@@ -87,6 +100,7 @@ impl<'a> Bidirectional<'a> {
             },
             // Of each iteration its own.
             merging: None,
+            guide: self.techniques.guide.clone(),
             roulette: recipe.roulette.then(|| Roulette {
                 light_subpaths: n_l / eye_samples,
                 constant: self.settings.expected * self.world.scene.mesh.total_area() / vertices,
@@ -130,7 +144,7 @@ impl<'a> Bidirectional<'a> {
         cache.clear();
         for index in subpaths {
             let sampler = Sampler::new(self.settings.seed, iteration, stream, index);
-            let mut walk = from_light::emit(world, self.settings.mis, &sampler, self.techniques.eye_hits);
+            let mut walk = self.techniques.emit(world, &sampler);
             while let Some(light) = walk.filter(|light| light.depth < self.settings.max_depth) {
                 if !light.vertex.bsdf.is_delta() {
                     if self.keeps_vertices() && light.depth + more <= self.settings.max_depth {
@@ -154,14 +168,20 @@ impl<'a> Bidirectional<'a> {
     }
 
     /// The light pass of an iteration: fills the cache, in the order of the subpaths.
-    fn light_pass(&mut self, iteration: u64, film: &Film, progress: &(dyn Fn(f64) + Sync)) -> Tally {
+    pub(super) fn light_pass(
+        &mut self,
+        stream: Stream,
+        iteration: u64,
+        film: Option<&Film>,
+        progress: &(dyn Fn(f64) + Sync),
+    ) -> Tally {
         let done = AtomicU64::new(0);
         let parts: Vec<(LightCache, Tally)> = (0..self.light_subpaths.div_ceil(CHUNK))
             .into_par_iter()
             .map(|chunk| {
                 let mut cache = LightCache::default();
                 let range = chunk * CHUNK..((chunk + 1) * CHUNK).min(self.light_subpaths);
-                let tally = self.trace_light(Stream::Light, iteration, range, &mut cache, Some(film));
+                let tally = self.trace_light(stream, iteration, range, &mut cache, film);
                 let traced = done.fetch_add(tally.light_subpaths, Ordering::Relaxed) + tally.light_subpaths;
                 progress(traced as f64 / self.light_subpaths as f64);
                 (cache, tally)
@@ -189,7 +209,9 @@ impl<'a> Bidirectional<'a> {
             if !vertex.walk.vertex.bsdf.is_delta() {
                 sum += self.next_event(&vertex, sample, clock, tally);
                 sum += if !vertex.lobes.is_empty() {
-                    self.play_roulette(&vertex, sample, clock, tally)
+                    let mut kept = Spectrum::ZERO;
+                    self.play_roulette(&vertex, &sample.sampler, clock, tally, &mut |_, value| kept += value);
+                    kept
                 } else {
                     match self.recipe.base {
                         Base::Off => Spectrum::ZERO,
@@ -292,33 +314,33 @@ impl<'a> Bidirectional<'a> {
         sum
     }
 
-    /// Connections to what the roulette keeps of all light vertices.
-    fn play_roulette(
+    /// Connections to what the roulette keeps of all light vertices: visits each that counts, with its value.
+    pub(super) fn play_roulette(
         &self,
         vertex: &EyeVertex,
-        sample: &Sample,
+        sampler: &Sampler,
         clock: Clock,
         tally: &mut Tally,
-    ) -> Spectrum {
-        let Some(roulette) = &self.techniques.roulette else { return Spectrum::ZERO };
+        visit: &mut impl FnMut(u32, Spectrum),
+    ) {
+        let Some(roulette) = &self.techniques.roulette else { return };
         let depth = vertex.walk.depth;
-        let key = sample.sampler.bits(depth, Purpose::Roulette);
         let position = vertex.walk.vertex.point.position;
+        let key = sampler.bits(depth, Purpose::Roulette);
         let query = Query::new(position, &vertex.lobes, roulette.constant, key);
         let mut kept = Vec::new();
         let Tally { roulette: counters, roulette_seconds, .. } = tally;
         clock.time(roulette_seconds, || {
             roulette::query(&self.bvh, &query, counters, &mut |index, p| kept.push((index, p)));
         });
-        let mut sum = Spectrum::ZERO;
         for (index, p) in kept {
             if depth + 1 + self.cache.depth(index as usize) <= self.settings.max_depth {
                 let light = self.cache.load(self.world, index as usize);
                 let (m, tries) = (roulette.light_subpaths * p, self.light_subpaths as f64 * p);
-                sum += self.if_visible(vertex.connect(&self.techniques, &light, m, tries), clock, tally);
+                let connection = vertex.connect(&self.techniques, &light, m, tries);
+                visit(index, self.if_visible(connection, clock, tally));
             }
         }
-        sum
     }
 }
 
@@ -328,7 +350,8 @@ impl Integrator for Bidirectional<'_> {
             light_subpaths: self.light_subpaths as f64,
             radius: merging::radius(self.first_radius, self.settings.merge_shrink, iteration),
         });
-        let mut tally = self.light_pass(iteration, film, &|fraction| progress(LIGHT_SHARE * fraction));
+        let on_light_side = |fraction| progress(LIGHT_SHARE * fraction);
+        let mut tally = self.light_pass(Stream::Light, iteration, Some(film), &on_light_side);
         if self.recipe.roulette || self.recipe.merging {
             let start = Instant::now();
             self.bvh.build(self.cache.positions())?;

@@ -4,6 +4,7 @@
 pub mod recipe;
 pub mod path;
 pub mod bidirectional;
+mod guiding;
 mod merging;
 mod records;
 mod tile;
@@ -28,10 +29,13 @@ pub trait Integrator {
     }
 }
 
-/// The integrator that the settings name.
-pub fn new<'a>(world: &'a World<'a>, settings: &'a Settings) -> Box<dyn Integrator + 'a> {
-    match Recipe::of(settings.integrator) {
+/// The integrator that the settings name, its pre-passes done.
+///
+/// # Errors
+/// [`Error::Input`](crate::Error::Input) when light vertices do not fit a tree.
+pub fn new<'a>(world: &'a World<'a>, settings: &'a Settings) -> Result<Box<dyn Integrator + 'a>> {
+    Ok(match Recipe::of(settings.integrator) {
         None => Box::new(path::PathTracer::new(world, settings)),
-        Some(recipe) => Box::new(bidirectional::Bidirectional::new(world, settings, recipe)),
-    }
+        Some(recipe) => Box::new(bidirectional::Bidirectional::new(world, settings, recipe)?),
+    })
 }

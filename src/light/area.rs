@@ -20,6 +20,7 @@ pub struct Lights {
 #[derive(Debug, Clone)]
 struct Emitter {
     triangle: u32,
+    material: u32,
     corners: [DVec3; 3],
     ng: DVec3,
     error: f64,
@@ -40,6 +41,8 @@ pub struct EmitterPoint {
     pub two_sided: bool,
     /// Density of the point over all emitters' area, 1/m^2.
     pub pdf_a: f64,
+    /// The emitter's number.
+    pub emitter: u32,
 }
 
 impl Lights {
@@ -63,6 +66,7 @@ impl Lights {
             weights.push(power);
             emitters.push(Emitter {
                 triangle,
+                material: mesh.materials[triangle as usize],
                 corners,
                 ng: mesh.scaled_normal(triangle).normalize(),
                 error: SurfacePoint::error_on(&corners),
@@ -88,13 +92,20 @@ impl Lights {
         self.emitters.len()
     }
 
+    /// For each emitter, something that is equal for emitters of the same material and nearly the same orientation.
+    pub(super) fn kinds(&self) -> impl Iterator<Item = (u32, [i16; 3])> {
+        const STEPS: f64 = 64.0;
+        self.emitters.iter().map(|e| (e.material, (e.ng * STEPS).round().to_array().map(|x| x as i16)))
+    }
+
     /// A point on some emitter, `None` when there is none. `pick` and `u` are uniform in [0,1).
     #[inline(always)]
     pub fn sample_point(&self, pick: f64, u: DVec2) -> Option<EmitterPoint> {
         if self.emitters.is_empty() {
             return None;
         }
-        let emitter = &self.emitters[self.pick.sample(pick)];
+        let index = self.pick.sample(pick);
+        let emitter = &self.emitters[index];
         let uv = warp::square_to_triangle(u);
         let [a, b, c] = emitter.corners;
         let position = a * (1.0 - uv.x - uv.y) + b * uv.x + c * uv.y;
@@ -105,7 +116,7 @@ impl Lights {
             triangle: emitter.triangle,
             error: emitter.error,
         };
-        Some(emitter.at(point))
+        Some(emitter.at(index as u32, point))
     }
 
     /// The emitter's side of a point that a path has hit, `None` when its triangle does not emit.
@@ -113,15 +124,16 @@ impl Lights {
     pub fn at(&self, point: &SurfacePoint) -> Option<EmitterPoint> {
         match self.of_triangle.get(point.triangle as usize) {
             None | Some(&NOT_EMITTING) => None,
-            Some(&i) => Some(self.emitters[i as usize].at(*point)),
+            Some(&i) => Some(self.emitters[i as usize].at(i, *point)),
         }
     }
 }
 
 impl Emitter {
     #[inline(always)]
-    fn at(&self, point: SurfacePoint) -> EmitterPoint {
-        EmitterPoint { point, emission: self.emission, two_sided: self.two_sided, pdf_a: self.pdf_a }
+    fn at(&self, emitter: u32, point: SurfacePoint) -> EmitterPoint {
+        let &Self { emission, two_sided, pdf_a, .. } = self;
+        EmitterPoint { point, emission, two_sided, pdf_a, emitter }
     }
 }
 
@@ -139,6 +151,16 @@ impl EmitterPoint {
         } else {
             warp::cosine_hemisphere_pdf(cos)
         }
+    }
+
+    /// The point of the unit square that [`EmitterPoint::sample_direction`] turns into a direction.
+    pub fn square_of(&self, direction: DVec3) -> DVec2 {
+        let local = Frame::from_z(self.point.ng).to_local(direction);
+        let mut u = warp::disc_to_square(local.truncate());
+        if self.two_sided {
+            u.x = 0.5 * (u.x + if local.z < 0.0 { 1.0 } else { 0.0 });
+        }
+        u
     }
 
     /// A direction in which the point emits; `u` is uniform in the unit square. `None` on the horizon.

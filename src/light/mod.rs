@@ -2,4 +2,7 @@
 
 pub mod area;
 
+pub mod guide;
+
 pub use area::{EmitterPoint, Lights};
+pub use guide::EmissionGuide;

@@ -42,6 +42,14 @@ impl Discrete {
         (self.cdf[index] - below) / self.total
     }
 
+    /// As [`Discrete::sample`], with where `u` lies within the index's share: uniform in [0,1).
+    pub fn sample_and_rest(&self, u: f64) -> (usize, f64) {
+        let index = self.sample(u);
+        let below = if index == 0 { 0.0 } else { self.cdf[index - 1] };
+        let rest = (u * self.total - below) / (self.cdf[index] - below);
+        (index, rest.clamp(0.0, 1.0 - f64::EPSILON))
+    }
+
     /// The index that `u` in [0,1) falls on; never one of weight 0.
     #[inline(always)]
     pub fn sample(&self, u: f64) -> usize {

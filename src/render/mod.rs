@@ -50,7 +50,7 @@ fn run(scene: &Scene, settings: &Settings, observer: &dyn Observer) -> Result<Ou
     if world.lights.is_empty() {
         observer.warn("nothing in the scene emits light: the image is black");
     }
-    let mut integrator = integrator::new(&world, &settings);
+    let mut integrator = integrator::new(&world, &settings)?;
     let mut film = Film::new(&scene.film);
     let mut tally = Tally::default();
     let mut bytes = (0, 0);

@@ -31,6 +31,10 @@ pub enum Stream {
     Pilot = 3,
     /// Eye subpaths that importance records are made along.
     Records = 4,
+    /// Light subpaths of the pre-pass that learns where to send them.
+    GuideLight = 5,
+    /// Eye subpaths of that.
+    GuideEye = 6,
 }
 
 /// What a number decides at a vertex.

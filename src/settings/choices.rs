@@ -109,6 +109,16 @@ choice! {
     }
 }
 
+choice! {
+    /// Whether light subpaths are sent where earlier ones proved useful.
+    Guiding, "guiding", guiding {
+        /// By the cosine alone.
+        Off = "off",
+        /// By what a pre-pass found.
+        On = "on",
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -117,6 +127,7 @@ mod tests {
     fn names_are_read_back() {
         assert!(Integrator::ALL.iter().all(|v| v.to_string().parse() == Ok(*v)));
         assert!(Backend::ALL.iter().all(|v| v.to_string().parse() == Ok(*v)));
+        assert!(Guiding::ALL.iter().all(|v| v.to_string().parse() == Ok(*v)));
         assert!(Heuristic::ALL.iter().all(|v| v.to_string().parse() == Ok(*v)));
         assert_eq!("lvc+hrr".parse(), Ok(Integrator::LvcHrr));
         assert_eq!("brute".parse(), Ok(Backend::Brute));

@@ -4,7 +4,7 @@
 mod choices;
 mod table;
 
-pub use choices::{Backend, Heuristic, Integrator};
+pub use choices::{Backend, Guiding, Heuristic, Integrator};
 pub use table::TABLE;
 
 use crate::error::{Error, Place};
@@ -38,6 +38,8 @@ pub struct Settings {
     pub expected: f64,
     /// Largest GGX roughness at which the roulette is used.
     pub hrr_alpha: f64,
+    /// Whether light subpaths are sent where earlier ones proved useful to the roulette.
+    pub guiding: Guiding,
     /// How techniques that find the same path share its weight.
     pub mis: Heuristic,
     /// Light subpaths that probabilistic connections (`pcbpt`) choose from.
@@ -68,6 +70,7 @@ impl Default for Settings {
             connections: 1,
             expected: 1.0,
             hrr_alpha: 0.3,
+            guiding: Guiding::On,
             mis: Heuristic::Balance,
             reused_subpaths: 100,
             record_spacing: 8,

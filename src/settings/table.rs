@@ -1,6 +1,6 @@
 //! One row for every setting.
 
-use super::{Backend, Heuristic, Integrator, Kind, Setting};
+use super::{Backend, Guiding, Heuristic, Integrator, Kind, Setting};
 
 const TRANSPORT: &str = "Light transport";
 const BUDGET: &str = "Budget and randomness";
@@ -100,6 +100,21 @@ pub const TABLE: &[Setting] = &[
         heading: TRANSPORT,
         help: "Largest GGX roughness at which the roulette is used",
         doc: "",
+    },
+    Setting {
+        name: "guiding",
+        kind: Kind::Choice {
+            names: &Guiding::NAMES,
+            planned: &[],
+            get: |s| s.guiding as usize,
+            set: |s, i| s.guiding = Guiding::ALL[i],
+        },
+        default: "on",
+        value_name: "NAME",
+        heading: TRANSPORT,
+        help: "Whether emitters send light (+hrr) where a pre-pass found it useful",
+        doc: "on: towards what reaches the image by way of surfaces where the roulette plays; three directions of ten \
+              stay as they are without. off: by the cosine alone.",
     },
     Setting {
         name: "mis",

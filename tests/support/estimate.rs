@@ -20,7 +20,7 @@ pub struct Estimate {
 /// Runs `settings.iterations` iterations, each on a film of its own.
 pub fn estimate(scene: &Scene, settings: &Settings, block: u32) -> Estimate {
     let world = World::new(scene, settings).unwrap();
-    let mut integrator = hrr::integrator::new(&world, settings);
+    let mut integrator = hrr::integrator::new(&world, settings).unwrap();
     let blocks = (scene.film.width.div_ceil(block), scene.film.height.div_ceil(block));
     let count = (blocks.0 * blocks.1) as usize;
     let (mut sum, mut square) = (vec![0.0; count], vec![0.0; count]);

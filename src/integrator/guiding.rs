@@ -1,0 +1,71 @@
+//! The pre-pass that learns where light subpaths are worth sending: a small light and eye pass, and what the roulette's
+//! connections of these bring to the image, by the direction in which their light left.
+
+use super::bidirectional::Bidirectional;
+use crate::connect::EyeVertex;
+use crate::error::Result;
+use crate::light::EmissionGuide;
+use crate::math::luminance;
+use crate::sampler::{Purpose, Sampler, Stream};
+use crate::subpath::from_light;
+use crate::tally::{Clock, Tally};
+use glam::DVec2;
+use rayon::prelude::*;
+use std::sync::Arc;
+
+/// Light subpaths of the pre-pass, and eye subpaths: an eighth of an iteration's, within these bounds.
+const LIGHT_SUBPATHS: (u64, u64) = (1 << 12, 1 << 18);
+const EYE_SUBPATHS: (u64, u64) = (1 << 12, 1 << 17);
+/// Eye subpaths of one task.
+const CHUNK: u64 = 1024;
+
+impl Bidirectional<'_> {
+    /// Learns from a pre-pass. It depends on the seed and the settings alone, so that all iterations share its result
+    /// and can be added up.
+    pub(super) fn learn_guide(&mut self) -> Result<Option<Arc<EmissionGuide>>> {
+        let all = self.light_subpaths;
+        let film = &self.world.scene.film;
+        let samples = u64::from(film.width) * u64::from(film.height) * u64::from(self.settings.samples);
+        let eye_subpaths = (samples / 8).clamp(EYE_SUBPATHS.0, EYE_SUBPATHS.1);
+        self.light_subpaths = (all / 8).clamp(LIGHT_SUBPATHS.0, LIGHT_SUBPATHS.1);
+        self.techniques = self.plan();
+        self.light_pass(Stream::GuideLight, 0, None, &|_| ());
+        self.bvh.build(self.cache.positions())?;
+        // Collected in order: sums must not depend on threads.
+        let found: Vec<Vec<(u32, f64)>> = (0..eye_subpaths / CHUNK)
+            .into_par_iter()
+            .map(|chunk| {
+                let mut found = Vec::new();
+                (chunk * CHUNK..(chunk + 1) * CHUNK).for_each(|index| self.observe(index, &mut found));
+                found
+            })
+            .collect();
+        let (world, seed) = (self.world, self.settings.seed);
+        let observations = found.into_iter().flatten().filter_map(|(vertex, score)| {
+            let subpath = self.cache.subpath_of(vertex as usize) as u64;
+            let sampler = Sampler::new(seed, 0, Stream::GuideLight, subpath);
+            let (emitter, direction) = from_light::start(world, None, &sampler)?;
+            Some((emitter, direction, score))
+        });
+        let guide = EmissionGuide::learn(&world.lights, observations);
+        self.light_subpaths = all;
+        Ok(guide.map(Arc::new))
+    }
+
+    /// What light vertices give to an eye subpath through the roulette.
+    fn observe(&self, index: u64, found: &mut Vec<(u32, f64)>) {
+        let (world, film) = (self.world, &self.world.scene.film);
+        let sampler = Sampler::new(self.settings.seed, 0, Stream::GuideEye, index);
+        let raster = sampler.u2(0, Purpose::Raster) * DVec2::new(film.width.into(), film.height.into());
+        let mut eye = EyeVertex::first(world, &self.techniques, raster);
+        let mut tally = Tally::default();
+        while let Some(vertex) = eye.filter(|v| v.walk.depth < self.settings.max_depth) {
+            if !vertex.lobes.is_empty() {
+                self.play_roulette(&vertex, &sampler, Clock::off(), &mut tally, &mut |light, value| {
+                    found.push((light, luminance(value)));
+                });
+            }
+            eye = vertex.next(world, &self.techniques, &sampler);
+        }
+    }
+}
