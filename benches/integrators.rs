@@ -90,6 +90,7 @@ fn caustic(name: &str, seconds: f64, light_subpaths: u64, samples: u32) {
     let large = Settings { integrator: Integrator::Lvc, ..roulette.clone() };
     let small = Settings { light_subpaths: 0, samples: 1, ..large.clone() };
     let plain = Settings { guiding: Guiding::Off, ..roulette.clone() };
+    let all = Settings { storing: 1.0, ..roulette.clone() };
     let power = Settings { mis: Heuristic::Power, ..roulette.clone() };
     let seeds = [1, 2].map(|seed| Settings { seed, ..roulette.clone() });
     let world = World::new(&scene, &roulette).expect("a world");
@@ -110,12 +111,13 @@ fn caustic(name: &str, seconds: f64, light_subpaths: u64, samples: u32) {
         Contender::new("lvc", &world, &large),
         Contender::new("lvc+hrr", &world, &roulette),
         Contender::new("lvc+hrr, power heuristic", &world, &power),
+        Contender::new("lvc+hrr, all light vertices stored", &world, &all),
         Contender::new("lvc+hrr, unguided", &world, &plain),
         Contender::new("reference", &world, &seeds[0]),
         Contender::new("reference", &world, &seeds[1]),
     ];
     // References get twice the time each.
-    let share = |i: usize| if i < 5 { 1.0 } else { 2.0 };
+    let share = |i: usize| if i < 6 { 1.0 } else { 2.0 };
     while let Some((_, next)) = runs
         .iter_mut()
         .enumerate()
@@ -124,7 +126,7 @@ fn caustic(name: &str, seconds: f64, light_subpaths: u64, samples: u32) {
     {
         next.iterate();
     }
-    let [a, b] = [5, 6].map(|i| runs[i].luminances(&pixels));
+    let [a, b] = [6, 7].map(|i| runs[i].luminances(&pixels));
     let reference: Vec<f64> = a.iter().zip(&b).map(|(a, b)| (a + b) / 2.0).collect();
     let noise = mse(&a, &b).map(|d| d / 4.0);
     println!(
@@ -137,7 +139,7 @@ fn caustic(name: &str, seconds: f64, light_subpaths: u64, samples: u32) {
         [0, 1, 2].map(|k| measured[k] - noise[k])
     };
     let ours = errors(&runs[2]);
-    for run in &runs[..5] {
+    for run in &runs[..6] {
         let [all, trimmed, median] = errors(run);
         println!(
             "  {:66} {:4} iterations, {:5.1} s: MSE {all:.3e} (x{:.2}), without the worst 1 % {trimmed:.3e} (x{:.2}), \

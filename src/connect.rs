@@ -17,7 +17,8 @@ pub struct EyeVertex {
     pub walk: Walk,
     /// The roulette's lobes here; empty where it is off.
     pub lobes: Lobes,
-    /// m of the edge to the previous eye vertex, were this vertex the light subpath's last.
+    /// m of the edge to the previous eye vertex, were this vertex the light subpath's last; over the probability of
+    /// storing it, if that edge does not lead to the camera.
     m_previous: f64,
     /// m of that edge, were this vertex on an emitter.
     m_emitter: f64,
@@ -34,9 +35,9 @@ impl EyeVertex {
             direction,
             pdf_w: world.camera.pdf_w(direction),
             cos: 1.0,
-            total: 0.0,
+            total: [0.0; 2],
         };
-        let walk = Walk::follow(world, techniques.heuristic, &start, Spectrum::ONE, 1, false)?;
+        let walk = Walk::follow(world, &techniques.rules(Transport::Radiance), &start, Spectrum::ONE)?;
         Some(Self::new(techniques, walk, techniques.light_image, 0.0))
     }
 
@@ -48,14 +49,12 @@ impl EyeVertex {
 
     /// Goes on to the next eye vertex.
     pub fn next(&self, world: &World<'_>, techniques: &Techniques, sampler: &Sampler) -> Option<Self> {
-        let walk = self.walk.next(
-            world,
-            techniques.heuristic,
-            Transport::Radiance,
-            sampler,
-            techniques.eta(),
-            |_| self.m_previous,
-        )?;
+        let walk = self.walk.next(world, &techniques.rules(Transport::Radiance), sampler, |s| {
+            if s.delta {
+                return [techniques.heuristic.total(&self.walk.side, 0.0, s.pdf_rev, 0.0), 0.0];
+            }
+            self.totals(techniques, s.pdf_rev)
+        })?;
         if walk.after_delta {
             return Some(Self::new(techniques, walk, 0.0, 0.0));
         }
@@ -64,15 +63,27 @@ impl EyeVertex {
     }
 
     /// E_s of a technique whose light side ends with an edge along `w_light`; `density`: in which the light side would
-    /// choose this vertex.
-    fn others(&self, techniques: &Techniques, density: f64, w_light: DVec3) -> f64 {
-        techniques.heuristic.others(density, self.total(techniques, w_light))
+    /// choose this vertex; `stored`: with what probability it would be stored after that.
+    fn others(&self, techniques: &Techniques, density: f64, w_light: DVec3, stored: f64) -> f64 {
+        techniques.heuristic.others(density, self.total(techniques, w_light, stored))
     }
 
     /// The sum over the eye side's techniques up to this vertex, when the path goes on along `w_light`.
-    fn total(&self, techniques: &Techniques, w_light: DVec3) -> f64 {
+    fn total(&self, techniques: &Techniques, w_light: DVec3, stored: f64) -> f64 {
         let back = self.walk.vertex.pdf_w(w_light, self.walk.vertex.wo);
-        techniques.heuristic.total(&self.walk.side, self.m_previous, back, techniques.eta())
+        let [known, if_stored] = self.totals(techniques, back);
+        known + techniques.heuristic.raise(stored) * if_stored
+    }
+
+    /// The sum over the eye side's techniques up to this vertex: of those that do not need it stored as a light vertex,
+    /// and, over the probability of that, of those that do. `back`: density of scattering to the previous vertex, 1/sr.
+    fn totals(&self, techniques: &Techniques, back: f64) -> [f64; 2] {
+        let (heuristic, side, eta) = (techniques.heuristic, &self.walk.side, techniques.eta());
+        if self.walk.depth == 1 {
+            [heuristic.total(side, self.m_previous, back, 0.0), heuristic.raise(eta)]
+        } else {
+            [heuristic.total(side, 0.0, back, 0.0), heuristic.total(side, self.m_previous, 0.0, eta)]
+        }
     }
 
     /// Radiance that this vertex emits itself, by technique s = 0.
@@ -118,7 +129,10 @@ impl EyeVertex {
         let (heuristic, m) = (techniques.heuristic, techniques.next_event);
         let l = per_area(pdf_w, cos_light, edge.distance2) * techniques.eye_hits / emitter.pdf_a;
         let emission = techniques.emission_pdf_w(&emitter, -edge.w);
-        let e = self.others(techniques, per_area(emission, cos, edge.distance2), edge.w);
+        let stored = techniques
+            .storing
+            .probability(techniques.storing.is_narrow(&world.bsdf_of(emitter.point.triangle)));
+        let e = self.others(techniques, per_area(emission, cos, edge.distance2), edge.w, stored);
         let value = value * (heuristic.weight(heuristic.raise(l), m, e) / emitter.pdf_a);
         Some((value, offset::between(&vertex.point, &emitter.point)))
     }
@@ -148,7 +162,8 @@ impl EyeVertex {
         let heuristic = techniques.heuristic;
         let l = techniques.light_others(light, per_area(pdf_w, cos_light, edge.distance2), -edge.w);
         let density = per_area(y.pdf_w(y.wo, -edge.w), cos, edge.distance2);
-        let e = self.others(techniques, density, edge.w);
+        let stored = techniques.storing.probability(techniques.storing.is_narrow(&y.bsdf));
+        let e = self.others(techniques, density, edge.w, stored);
         let value = value * (heuristic.weight(l, m, e) / tries);
         Some((value, offset::between(&eye.point, &y.point)))
     }
@@ -160,9 +175,10 @@ impl EyeVertex {
         if value == Spectrum::ZERO {
             return value;
         }
-        let eta = merging.eta();
+        let stored = techniques.stored(light);
+        let eta = merging.eta() * stored;
         let light_total = techniques.light_total(light, vertex.wo);
-        let eye_total = self.total(techniques, light.vertex.wo);
+        let eye_total = self.total(techniques, light.vertex.wo, stored);
         value * (techniques.heuristic.merging_weight(light_total, eta, eye_total) / eta)
     }
 }

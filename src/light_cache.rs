@@ -17,6 +17,7 @@ struct Record {
     throughput: Vec3,
     depth: u32,
     after_delta: bool,
+    after_narrow: [bool; 2],
     side: Side,
 }
 
@@ -50,6 +51,7 @@ impl LightCache {
             throughput: light.throughput.as_vec3(),
             depth: light.depth,
             after_delta: light.after_delta,
+            after_narrow: light.after_narrow,
             side: light.side,
         });
     }
@@ -116,6 +118,7 @@ impl LightCache {
             distance: f64::from(r.distance),
             depth: r.depth,
             after_delta: r.after_delta,
+            after_narrow: r.after_narrow,
         }
     }
 

@@ -6,8 +6,8 @@ use crate::math::luminance;
 use crate::mis::Heuristic;
 use crate::roulette::{self, Lobe};
 use crate::sampler::Sampler;
-use crate::subpath::walk::Walk;
-use crate::subpath::{Vertex, World, from_light};
+use crate::subpath::walk::{Rules, Walk};
+use crate::subpath::{Storing, Vertex, World, from_light};
 use glam::DVec3;
 use std::ops::Deref;
 use std::sync::Arc;
@@ -30,6 +30,8 @@ pub struct Techniques {
     pub roulette: Option<Roulette>,
     /// How light vertices are merged with eye vertices.
     pub merging: Option<Merging>,
+    /// Which light vertices are stored: a probability that is part of every m that needs one.
+    pub storing: Storing,
     /// Where light subpaths are sent; `None`: by the cosine.
     pub guide: Option<Arc<EmissionGuide>>,
 }
@@ -105,6 +107,7 @@ impl Techniques {
             base: 0.0,
             roulette: None,
             merging: None,
+            storing: Storing::ALL,
             guide: None,
         }
     }
@@ -139,8 +142,8 @@ impl Techniques {
         lobes
     }
 
-    /// m_s of an edge between two surfaces, neither of them delta. `lobes`: those of the eye-side vertex; `offset`:
-    /// from there to the light-side vertex.
+    /// m_s of an edge between two surfaces, neither of them delta, over the probability of storing the light-side one.
+    /// `lobes`: those of the eye-side vertex; `offset`: from there to the light-side vertex.
     pub fn connection(&self, lobes: &Lobes, offset: DVec3) -> f64 {
         match &self.roulette {
             Some(roulette) if !lobes.is_empty() => roulette.density(lobes, offset),
@@ -148,17 +151,25 @@ impl Techniques {
         }
     }
 
+    /// The probability with which a light vertex was stored.
+    pub fn stored(&self, light: &Walk) -> f64 {
+        self.storing.probability(light.after_narrow[0])
+    }
+
     /// m of the edge that leads to the light vertex's predecessor, were the light vertex an eye vertex seen from
     /// `w_eye`.
     pub fn before(&self, light: &Walk, w_eye: DVec3) -> f64 {
         if light.after_delta || light.vertex.bsdf.is_delta() {
-            0.0
-        } else if light.depth == 1 {
-            self.next_event
-        } else if self.roulette.is_none() {
-            self.base
+            return 0.0;
+        }
+        if light.depth == 1 {
+            return self.next_event;
+        }
+        let stored = self.storing.probability(light.after_narrow[1]);
+        if self.roulette.is_none() {
+            stored * self.base
         } else {
-            self.connection(&self.lobes(&light.vertex, w_eye), light.to_previous())
+            stored * self.connection(&self.lobes(&light.vertex, w_eye), light.to_previous())
         }
     }
 
@@ -172,10 +183,16 @@ impl Techniques {
 
     /// Starts a light subpath.
     pub fn emit(&self, world: &World<'_>, sampler: &Sampler) -> Option<Walk> {
-        from_light::emit(world, self.heuristic, self.guide.as_deref(), sampler, self.eye_hits)
+        let rules = self.rules(Transport::Importance);
+        from_light::emit(world, &rules, self.guide.as_deref(), sampler, self.eye_hits)
     }
 
-    /// eta at vertices that are not delta; 0 without merging.
+    /// What steps of a subpath need to know.
+    pub fn rules(&self, transport: Transport) -> Rules {
+        Rules { transport, heuristic: self.heuristic, storing: self.storing }
+    }
+
+    /// eta at vertices that are not delta, over the probability of storing; 0 without merging.
     pub fn eta(&self) -> f64 {
         self.merging.map_or(0.0, |merging| merging.eta())
     }
@@ -187,15 +204,20 @@ impl Techniques {
     }
 
     /// The sum over the light side's techniques up to a light vertex from which the path goes on along `w_eye`.
-    pub(crate) fn light_total(&self, light: &Walk, w_eye: DVec3) -> f64 {
+    pub fn light_total(&self, light: &Walk, w_eye: DVec3) -> f64 {
         let back = light.vertex.pdf_w(w_eye, light.vertex.wo);
-        self.heuristic.total(&light.side, self.before(light, w_eye), back, self.eta())
+        let merging = self.stored(light) * self.eta();
+        self.heuristic.total(&light.side, self.before(light, w_eye), back, merging)
     }
 
     /// Goes on along a light subpath.
     pub fn next_light(&self, world: &World<'_>, light: &Walk, sampler: &Sampler) -> Option<Walk> {
-        light.next(world, self.heuristic, Transport::Importance, sampler, self.eta(), |wi| {
-            self.before(light, wi)
+        light.next(world, &self.rules(Transport::Importance), sampler, |s| {
+            if s.delta {
+                return [self.heuristic.total(&light.side, 0.0, s.pdf_rev, 0.0), 0.0];
+            }
+            let merging = self.stored(light) * self.eta();
+            [self.heuristic.total(&light.side, self.before(light, s.wi), s.pdf_rev, merging), 0.0]
         })
     }
 }

@@ -12,7 +12,7 @@ use hrr::mis::Heuristic;
 use hrr::sampler::{Purpose, Sampler, Stream};
 use hrr::settings::{Backend, Settings};
 use hrr::subpath::walk::Start;
-use hrr::subpath::{Vertex, Walk, World};
+use hrr::subpath::{Storing, Vertex, Walk, World};
 use hrr::techniques::{Merging, Roulette, Techniques};
 use hrr::visibility::offset;
 use std::sync::Arc;
@@ -26,6 +26,7 @@ const TECHNIQUES: Techniques = Techniques {
     base: 1.7,
     roulette: Some(Roulette { light_subpaths: 1400.0, constant: 0.02, max_alpha: 0.3 }),
     merging: Some(Merging { light_subpaths: 1400.0, radius: 0.01 }),
+    storing: Storing { share: 0.3, max_alpha: 0.22 },
     guide: None,
 };
 
@@ -86,6 +87,12 @@ impl Path {
             }
             self.pdf_w(world, i + 1, i + 2, i) * self.g(world, i + 1, i)
         };
+        // The probability of storing vertex i: what threw light on it decides.
+        let stored = |i: usize| {
+            let triangle =
+                if i == 1 { self.emitter.point.triangle } else { self.surfaces[i - 2].point.triangle };
+            if t.storing.is_narrow(&world.bsdf_of(triangle)) { 1.0 } else { t.storing.share }
+        };
         let m = |s: usize| {
             if s == 0 {
                 return t.eye_hits;
@@ -101,11 +108,12 @@ impl Path {
             }
             let lobes = t.lobes(&self.surfaces[s - 1], self.to(world, s, s + 1));
             let offset = self.position(world, s - 1) - self.position(world, s);
-            t.connection(&lobes, offset)
+            t.connection(&lobes, offset) * stored(s - 1)
         };
         let b = |s: usize| (0..s).map(fw).product::<f64>() * (s..k - 1).map(rv).product::<f64>();
         let eta = t.merging.map_or(0.0, |m| m.light_subpaths * std::f64::consts::PI * m.radius * m.radius);
-        let merging = |i: usize| if i == 0 || i > k - 2 || delta(i) { 0.0 } else { eta * b(i) * fw(i) };
+        let merging =
+            |i: usize| if i == 0 || i > k - 2 || delta(i) { 0.0 } else { stored(i) * eta * b(i) * fw(i) };
         [(0..k).map(|s| m(s) * b(s)).collect(), (0..k).map(merging).collect()]
     }
 
@@ -144,7 +152,6 @@ fn eye_walks(world: &World<'_>, t: &Techniques, sampler: &Sampler, length: usize
 fn led_to(world: &World<'_>, t: &Techniques, light: &Walk, end: &Vertex) -> Option<Walk> {
     let y = &light.vertex;
     let direction = (end.point.position - y.point.position).normalize();
-    let m = t.before(light, direction);
     let pdf_w = y.pdf_w(y.wo, direction);
     let start = Start {
         ray: offset::leave(&y.point, direction),
@@ -152,11 +159,16 @@ fn led_to(world: &World<'_>, t: &Techniques, light: &Walk, end: &Vertex) -> Opti
         direction,
         pdf_w,
         cos: y.cos_ng(direction),
-        total: t.heuristic.total(&light.side, m, y.pdf_w(direction, y.wo), t.eta()),
+        total: [t.light_total(light, direction), 0.0],
     };
     let throughput = light.throughput * y.factor(direction, y.wo) * (start.cos / pdf_w);
-    Walk::follow(world, t.heuristic, &start, throughput, light.depth + 1, false)
-        .filter(|w| pdf_w > 0.0 && (w.vertex.point.position - end.point.position).length() < 1e-9)
+    let walk = Walk {
+        depth: light.depth + 1,
+        after_narrow: [t.storing.is_narrow(&y.bsdf), light.after_narrow[0]],
+        ..Walk::follow(world, &t.rules(Transport::Importance), &start, throughput)?
+    };
+    let there = (walk.vertex.point.position - end.point.position).length() < 1e-9;
+    (pdf_w > 0.0 && there).then_some(walk)
 }
 
 fn close(what: &str, by_recursion: f64, by_definition: f64) {
@@ -251,7 +263,7 @@ fn check(world: &World<'_>, t: &Techniques) {
             let path = path(start, &lights, &eyes);
             let s = lights.len() + 1;
             let offset = light.vertex.point.position - eye.walk.vertex.point.position;
-            let m = t.connection(&eye.lobes, offset);
+            let m = t.connection(&eye.lobes, offset) * t.stored(light);
             if let Some((value, _)) = eye.connect(t, light, m, 1.0) {
                 let (y, z) = (&light.vertex, &eye.walk.vertex);
                 let w = offset.normalize();
@@ -274,7 +286,8 @@ fn check(world: &World<'_>, t: &Techniques) {
             let (y, z) = (&light.vertex, &eye.walk.vertex);
             let merging = t.merging.as_ref().unwrap();
             let value = eye.merge(t, merging, &light);
-            let plain = eye.walk.throughput * z.factor(z.wo, y.wo) * light.throughput / merging.eta();
+            let tries = merging.eta() * t.stored(&light);
+            let plain = eye.walk.throughput * z.factor(z.wo, y.wo) * light.throughput / tries;
             if plain.x > 0.0 {
                 close("merging", value.x / plain.x, path.weight(world, t, 1, lights.len() + 1));
                 count(4, &path);

@@ -11,6 +11,7 @@ fn other_value(name: &str) -> &'static str {
         "light_subpaths" => "1234",
         "connections" => "3",
         "expected" => "0.25",
+        "storing" => "0.5",
         "guiding" => "off",
         "mis" => "power",
         "reused_subpaths" => "50",
@@ -54,6 +55,7 @@ fn every_field_has_its_row() {
         connections,
         expected,
         hrr_alpha,
+        storing,
         guiding,
         mis,
         reused_subpaths,
@@ -68,7 +70,7 @@ fn every_field_has_its_row() {
     assert_eq!((threads, expected, hrr_alpha, mis), (2, 0.25, 0.125, Heuristic::Power));
     assert_eq!((merge_radius, merge_pixels, merge_shrink), (0.5, 5.0, 1.0));
     assert_eq!((reused_subpaths, record_spacing), (50, 4));
-    assert_eq!((guiding, TABLE.len()), (Guiding::Off, 20));
+    assert_eq!((storing, guiding, TABLE.len()), (0.5, Guiding::Off, 21));
 }
 
 #[test]

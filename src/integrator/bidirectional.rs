@@ -14,7 +14,7 @@ use crate::math::Spectrum;
 use crate::roulette::{self, Query};
 use crate::sampler::{Purpose, Sampler, Stream};
 use crate::settings::{Guiding, Settings};
-use crate::subpath::{Walk, World};
+use crate::subpath::{Storing, Walk, World};
 use crate::tally::{Clock, Tally};
 use crate::techniques::{Merging, Roulette, Techniques};
 use crate::vertex_bvh::VertexBvh;
@@ -74,9 +74,11 @@ impl<'a> Bidirectional<'a> {
 
     /// Whether no material has lobes for the roulette.
     fn nothing_glossy(&self) -> bool {
-        let limit = self.settings.hrr_alpha;
-        let glossy =
-            |m: &Material| m.bsdf(DVec2::ZERO).glossy().is_some_and(|g| g.alpha_x.max(g.alpha_y) <= limit);
+        let narrow = Storing { share: 1.0, max_alpha: self.settings.hrr_alpha };
+        let glossy = |m: &Material| {
+            let bsdf = m.bsdf(DVec2::ZERO);
+            !bsdf.is_delta() && narrow.is_narrow(&bsdf)
+        };
         !self.world.scene.materials.iter().any(glossy)
     }
 
@@ -100,6 +102,12 @@ impl<'a> Bidirectional<'a> {
             },
             // Of each iteration its own.
             merging: None,
+            // Other uses of light vertices than the roulette want all of them.
+            storing: if recipe.roulette && !recipe.merging {
+                Storing { share: self.settings.storing, max_alpha: self.settings.hrr_alpha }
+            } else {
+                Storing::ALL
+            },
             guide: self.techniques.guide.clone(),
             roulette: recipe.roulette.then(|| Roulette {
                 light_subpaths: n_l / eye_samples,
@@ -147,7 +155,11 @@ impl<'a> Bidirectional<'a> {
             let mut walk = self.techniques.emit(world, &sampler);
             while let Some(light) = walk.filter(|light| light.depth < self.settings.max_depth) {
                 if !light.vertex.bsdf.is_delta() {
-                    if self.keeps_vertices() && light.depth + more <= self.settings.max_depth {
+                    let stored = self.techniques.stored(&light);
+                    if self.keeps_vertices()
+                        && light.depth + more <= self.settings.max_depth
+                        && (stored == 1.0 || sampler.u1(light.depth, Purpose::Storing) < stored)
+                    {
                         cache.push(&light);
                     }
                     if let Some(film) = film.filter(|_| self.recipe.light_image)
@@ -283,7 +295,7 @@ impl<'a> Bidirectional<'a> {
         sum
     }
 
-    /// A connection where the roulette is off, tried as often as `tries` says.
+    /// A connection where the roulette is off, tried as often as `tries` says over the probability of storing.
     fn connect_base(
         &self,
         vertex: &EyeVertex,
@@ -295,7 +307,9 @@ impl<'a> Bidirectional<'a> {
         if vertex.walk.depth + 1 + light.depth > self.settings.max_depth {
             return Spectrum::ZERO;
         }
-        let connection = vertex.connect(&self.techniques, light, self.techniques.base, tries);
+        let stored = self.techniques.stored(light);
+        let (m, tries) = (self.techniques.base * stored, tries * stored);
+        let connection = vertex.connect(&self.techniques, light, m, tries);
         self.if_visible(connection, clock, tally)
     }
 
@@ -336,6 +350,7 @@ impl<'a> Bidirectional<'a> {
         for (index, p) in kept {
             if depth + 1 + self.cache.depth(index as usize) <= self.settings.max_depth {
                 let light = self.cache.load(self.world, index as usize);
+                let p = p * self.techniques.stored(&light);
                 let (m, tries) = (roulette.light_subpaths * p, self.light_subpaths as f64 * p);
                 let connection = vertex.connect(&self.techniques, &light, m, tries);
                 visit(index, self.if_visible(connection, clock, tally));

@@ -59,6 +59,8 @@ pub enum Purpose {
     Survival,
     /// Which cached light vertex is picked.
     CachePick,
+    /// Whether a light vertex is stored.
+    Storing,
     /// Which distribution over cached light vertices it is picked by.
     RecordPick,
     /// Key of the roulette over all light vertices.

@@ -38,6 +38,8 @@ pub struct Settings {
     pub expected: f64,
     /// Largest GGX roughness at which the roulette is used.
     pub hrr_alpha: f64,
+    /// Probability of storing a light vertex whose predecessor does not scatter narrowly, where the roulette plays.
+    pub storing: f64,
     /// Whether light subpaths are sent where earlier ones proved useful to the roulette.
     pub guiding: Guiding,
     /// How techniques that find the same path share its weight.
@@ -70,6 +72,7 @@ impl Default for Settings {
             connections: 1,
             expected: 1.0,
             hrr_alpha: 0.3,
+            storing: 0.05,
             guiding: Guiding::On,
             mis: Heuristic::Balance,
             reused_subpaths: 100,

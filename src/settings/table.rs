@@ -102,6 +102,16 @@ pub const TABLE: &[Setting] = &[
         doc: "",
     },
     Setting {
+        name: "storing",
+        kind: Kind::Real { min: 1e-6, max: 1.0, get: |s| Some(s.storing), set: |s, v| s.storing = v },
+        default: "0.05",
+        value_name: "SHARE",
+        heading: TRANSPORT,
+        help: "Share of light vertices that are stored (+hrr) though no glossy surface threw light on them",
+        doc: "Light from lamps and diffuse surfaces is found by eye subpaths as well; leaving most of it out of the cache \
+              makes room and time for caustics. 1: all are stored, as always with vertex merging.",
+    },
+    Setting {
         name: "guiding",
         kind: Kind::Choice {
             names: &Guiding::NAMES,

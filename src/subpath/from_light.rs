@@ -1,9 +1,8 @@
 //! Light subpaths.
 
 use super::World;
-use super::walk::{Start, Walk};
+use super::walk::{Rules, Start, Walk};
 use crate::light::{EmissionGuide, EmitterPoint};
-use crate::mis::Heuristic;
 use crate::sampler::{Purpose, Sampler};
 use crate::visibility::offset;
 use glam::DVec3;
@@ -14,7 +13,7 @@ use glam::DVec3;
 /// nothing emits or nothing is met.
 pub fn emit(
     world: &World<'_>,
-    heuristic: Heuristic,
+    rules: &Rules,
     guide: Option<&EmissionGuide>,
     sampler: &Sampler,
     m_0: f64,
@@ -31,9 +30,11 @@ pub fn emit(
         direction,
         pdf_w,
         cos,
-        total: heuristic.raise(m_0 / emitter.pdf_a),
+        total: [rules.heuristic.raise(m_0 / emitter.pdf_a), 0.0],
     };
-    Walk::follow(world, heuristic, &start, emitter.emission * (cos / (emitter.pdf_a * pdf_w)), 1, false)
+    let throughput = emitter.emission * (cos / (emitter.pdf_a * pdf_w));
+    let narrow = rules.storing.is_narrow(&world.bsdf_of(emitter.point.triangle));
+    Some(Walk { after_narrow: [narrow, false], ..Walk::follow(world, rules, &start, throughput)? })
 }
 
 /// Where and in which direction a light subpath starts; `None` when nothing emits.

@@ -1,6 +1,6 @@
 //! One step of a subpath, the same from either end.
 
-use super::{Vertex, World};
+use super::{Scattered, Storing, Vertex, World};
 use crate::bsdf::Transport;
 use crate::math::Spectrum;
 use crate::mis::{Heuristic, Side};
@@ -24,6 +24,19 @@ pub struct Walk {
     pub depth: u32,
     /// Whether the previous vertex scattered by a delta lobe, so that nothing can connect to it.
     pub after_delta: bool,
+    /// Whether the previous vertex scatters narrowly ([`Storing`]), and the one before it.
+    pub after_narrow: [bool; 2],
+}
+
+/// What all steps of a subpath have in common.
+#[derive(Debug, Clone, Copy)]
+pub struct Rules {
+    /// What the subpath carries.
+    pub transport: Transport,
+    /// How techniques share a path.
+    pub heuristic: Heuristic,
+    /// Which light vertices are stored.
+    pub storing: Storing,
 }
 
 /// Where a segment starts.
@@ -39,20 +52,14 @@ pub struct Start {
     pub pdf_w: f64,
     /// |cos| at the origin.
     pub cos: f64,
-    /// [`Heuristic::total`] at the origin.
-    pub total: f64,
+    /// [`Heuristic::total`] at the origin: what is known, and what counts for the probability that the origin would be
+    /// stored as a light vertex, were the vertex that the segment leads to its predecessor.
+    pub total: [f64; 2],
 }
 
 impl Walk {
     /// Follows a segment to the surface it meets.
-    pub fn follow(
-        world: &World<'_>,
-        heuristic: Heuristic,
-        start: &Start,
-        throughput: Spectrum,
-        depth: u32,
-        after_delta: bool,
-    ) -> Option<Self> {
+    pub fn follow(world: &World<'_>, rules: &Rules, start: &Start, throughput: Spectrum) -> Option<Self> {
         let point = world.intersect(&start.ray, start.origin, start.direction)?;
         let wo = -start.direction;
         let cos = point.ng.dot(wo).abs();
@@ -60,39 +67,48 @@ impl Walk {
         if !(cos > 0.0 && distance2 > 0.0) {
             return None;
         }
+        let vertex = Vertex::new(world, point, wo);
+        let Rules { heuristic, storing, .. } = rules;
+        let [known, if_stored] = start.total;
+        let total = if if_stored == 0.0 {
+            known
+        } else {
+            known + heuristic.raise(storing.probability(storing.is_narrow(&vertex.bsdf))) * if_stored
+        };
         Some(Self {
-            vertex: Vertex::new(world, point, wo),
+            vertex,
             throughput,
-            side: heuristic.arrive(start.pdf_w, cos, start.cos, distance2, start.total),
+            side: heuristic.arrive(start.pdf_w, cos, start.cos, distance2, total),
             distance: distance2.sqrt(),
-            depth,
-            after_delta,
+            depth: 1,
+            after_delta: false,
+            after_narrow: [false; 2],
         })
     }
 
-    /// Scatters at the vertex and goes on to the next. `m` tells how often the technique that would connect the edge
-    /// to the previous vertex tries, given the direction in which the path leaves; neither it nor `merging`
-    /// ([`Heuristic::total`]) counts at delta lobes.
+    /// Scatters at the vertex and goes on to the next. `total` gives [`Start::total`] for the way the path goes on.
     pub fn next(
         &self,
         world: &World<'_>,
-        heuristic: Heuristic,
-        transport: Transport,
+        rules: &Rules,
         sampler: &Sampler,
-        merging: f64,
-        m: impl FnOnce(DVec3) -> f64,
+        total: impl FnOnce(&Scattered) -> [f64; 2],
     ) -> Option<Self> {
-        let s = self.vertex.sample(transport, sampler, self.depth)?;
-        let (m, merging) = if s.delta { (0.0, 0.0) } else { (m(s.wi), merging) };
+        let s = self.vertex.sample(rules.transport, sampler, self.depth)?;
         let start = Start {
             ray: offset::leave(&self.vertex.point, s.wi),
             origin: self.vertex.point.position,
             direction: s.wi,
             pdf_w: s.pdf,
             cos: self.vertex.cos_ng(s.wi),
-            total: heuristic.total(&self.side, m, s.pdf_rev, merging),
+            total: total(&s),
         };
-        Self::follow(world, heuristic, &start, self.throughput * s.weight, self.depth + 1, s.delta)
+        Some(Self {
+            depth: self.depth + 1,
+            after_delta: s.delta,
+            after_narrow: [rules.storing.is_narrow(&self.vertex.bsdf), self.after_narrow[0]],
+            ..Self::follow(world, rules, &start, self.throughput * s.weight)?
+        })
     }
 
     /// Offset from the vertex back to the previous one.

@@ -1,5 +1,6 @@
 //! A scene made ready for rays.
 
+use crate::bsdf::Bsdf;
 use crate::camera::Camera;
 use crate::error::Result;
 use crate::geometry::SurfacePoint;
@@ -7,7 +8,7 @@ use crate::light::Lights;
 use crate::scene::Scene;
 use crate::settings::Settings;
 use crate::visibility::{self, Ray, Visibility};
-use glam::DVec3;
+use glam::{DVec2, DVec3};
 
 /// A scene with its emitters, camera and ray queries. Shared by all threads.
 pub struct World<'a> {
@@ -34,6 +35,11 @@ impl<'a> World<'a> {
             camera: Camera::new(&scene.camera, (scene.film.width, scene.film.height), scene.mesh.origin)?,
             visibility: visibility::build(settings.visibility, &scene.mesh, settings.threads)?,
         })
+    }
+
+    /// The scattering model of a triangle, but for its texture.
+    pub fn bsdf_of(&self, triangle: u32) -> Bsdf {
+        self.scene.materials[self.scene.mesh.materials[triangle as usize] as usize].bsdf(DVec2::ZERO)
     }
 
     /// The surface point that a ray meets first. `origin` and unit `direction` are the ray in full precision, before
