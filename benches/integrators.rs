@@ -51,12 +51,15 @@ struct Contender<'a> {
 
 impl<'a> Contender<'a> {
     fn new(name: &str, world: &'a World<'a>, settings: &'a Settings) -> Self {
+        let start = Instant::now();
+        let integrator = hrr::integrator::new(world, settings).expect("a light pass");
         Self {
             name: format!("{name}, {} light subpaths, {} samples", settings.light_subpaths, settings.samples),
-            integrator: hrr::integrator::new(world, settings).expect("a light pass"),
+            integrator,
             film: Film::new(&world.scene.film),
             iterations: 0,
-            seconds: 0.0,
+            // Pre-passes count.
+            seconds: start.elapsed().as_secs_f64(),
         }
     }
 
@@ -72,26 +75,59 @@ impl<'a> Contender<'a> {
     }
 }
 
-/// Square difference: the mean over all pixels, the mean without the worst hundredth of them, the median.
-fn mse(a: &[f64], b: &[f64]) -> [f64; 3] {
-    let mut squares: Vec<f64> = a.iter().zip(b).map(|(a, b)| (a - b) * (a - b)).collect();
+/// Square difference over the square of the reference: the mean over all pixels, the mean without the worst hundredth
+/// of them, the median.
+fn relative_mse(image: &[f64], reference: &[f64]) -> [f64; 3] {
+    let error = |(a, r): (&f64, &f64)| (a - r) * (a - r) / (r * r + 1e-6);
+    let mut squares: Vec<f64> = image.iter().zip(reference).map(error).collect();
     squares.sort_by(f64::total_cmp);
     let mean = |v: &[f64]| v.iter().sum::<f64>() / v.len() as f64;
     [mean(&squares), mean(&squares[..squares.len() - squares.len() / 100]), squares[squares.len() / 2]]
 }
 
+/// Prints the errors of some runs in some pixels. The reference is the mean of the last two runs, whose own error, told
+/// by their difference, is taken off.
+fn report(region: &str, runs: &[Contender<'_>], pixels: &[(u32, u32)]) {
+    let (runs, references) = runs.split_at(runs.len() - 2);
+    let [a, b] = [0, 1].map(|i| references[i].luminances(pixels));
+    let reference: Vec<f64> = a.iter().zip(&b).map(|(a, b)| (a + b) / 2.0).collect();
+    // Each lies from the mean by as much as the mean lies from the truth.
+    let noise = relative_mse(&a, &reference);
+    println!("{region}: {} pixels; reference's own relMSE {:.2e}, {:.2e}", pixels.len(), noise[0], noise[1]);
+    let errors = |run: &Contender<'_>| {
+        let measured = relative_mse(&run.luminances(pixels), &reference);
+        [0, 1, 2].map(|k| measured[k] - noise[k])
+    };
+    let ours = errors(&runs[0]);
+    for run in runs {
+        let [all, trimmed, median] = errors(run);
+        println!(
+            "  {:62} {:4} iterations, {:5.1} s: relMSE {all:.3e} (x{:.2}), without the worst 1 % {trimmed:.3e} (x{:.2}), \
+             median {median:.3e} (x{:.2})",
+            run.name,
+            run.iterations,
+            run.seconds,
+            all / ours[0],
+            trimmed / ours[1],
+            median / ours[2]
+        );
+    }
+}
+
 /// The error in the mirror's pixels at equal time: plain picks from the cache, with small and with large iterations,
-/// against the roulette. The reference is two long renders with the roulette and other seeds; its own variance, told by
-/// their difference, is taken off the errors. Iterations are run in turn.
+/// against the roulette. The reference is two long renders with the roulette and other seeds. Iterations are run in turn.
 fn caustic(name: &str, seconds: f64, light_subpaths: u64, samples: u32) {
     let scene = load(name);
     let roulette =
         Settings { integrator: Integrator::LvcHrr, light_subpaths, samples, ..scene.settings.clone() };
-    let large = Settings { integrator: Integrator::Lvc, ..roulette.clone() };
-    let small = Settings { light_subpaths: 0, samples: 1, ..large.clone() };
-    let plain = Settings { guiding: Guiding::Off, ..roulette.clone() };
-    let all = Settings { storing: 1.0, ..roulette.clone() };
-    let power = Settings { mis: Heuristic::Power, ..roulette.clone() };
+    let others = [
+        ("lvc", Settings { integrator: Integrator::Lvc, light_subpaths: 0, samples: 1, ..roulette.clone() }),
+        ("lvc", Settings { integrator: Integrator::Lvc, ..roulette.clone() }),
+        ("lvc+hrr, power heuristic", Settings { mis: Heuristic::Power, ..roulette.clone() }),
+        ("lvc+hrr, all light vertices stored", Settings { storing: 1.0, ..roulette.clone() }),
+        ("lvc+hrr, unguided", Settings { guiding: Guiding::Off, ..roulette.clone() }),
+        ("lvc+hrr, neither", Settings { guiding: Guiding::Off, storing: 1.0, ..roulette.clone() }),
+    ];
     let seeds = [1, 2].map(|seed| Settings { seed, ..roulette.clone() });
     let world = World::new(&scene, &roulette).expect("a world");
     let camera = &world.camera;
@@ -106,18 +142,12 @@ fn caustic(name: &str, seconds: f64, light_subpaths: u64, samples: u32) {
         })
         .collect();
     assert!(!pixels.is_empty(), "no pixel sees a material named 'mirror'");
-    let mut runs = [
-        Contender::new("lvc", &world, &small),
-        Contender::new("lvc", &world, &large),
-        Contender::new("lvc+hrr", &world, &roulette),
-        Contender::new("lvc+hrr, power heuristic", &world, &power),
-        Contender::new("lvc+hrr, all light vertices stored", &world, &all),
-        Contender::new("lvc+hrr, unguided", &world, &plain),
-        Contender::new("reference", &world, &seeds[0]),
-        Contender::new("reference", &world, &seeds[1]),
-    ];
+    let mut runs = vec![Contender::new("lvc+hrr", &world, &roulette)];
+    runs.extend(others.iter().map(|(name, settings)| Contender::new(name, &world, settings)));
+    runs.extend(seeds.iter().map(|settings| Contender::new("reference", &world, settings)));
     // References get twice the time each.
-    let share = |i: usize| if i < 6 { 1.0 } else { 2.0 };
+    let last = runs.len() - 2;
+    let share = |i: usize| if i < last { 1.0 } else { 2.0 };
     while let Some((_, next)) = runs
         .iter_mut()
         .enumerate()
@@ -126,31 +156,14 @@ fn caustic(name: &str, seconds: f64, light_subpaths: u64, samples: u32) {
     {
         next.iterate();
     }
-    let [a, b] = [6, 7].map(|i| runs[i].luminances(&pixels));
-    let reference: Vec<f64> = a.iter().zip(&b).map(|(a, b)| (a + b) / 2.0).collect();
-    let noise = mse(&a, &b).map(|d| d / 4.0);
-    println!(
-        "{name}: {} pixels of the mirror, {seconds} s each; reference's own MSE {:.2e}",
-        pixels.len(),
-        noise[0]
-    );
-    let errors = |run: &Contender<'_>| {
-        let measured = mse(&run.luminances(&pixels), &reference);
-        [0, 1, 2].map(|k| measured[k] - noise[k])
-    };
-    let ours = errors(&runs[2]);
-    for run in &runs[..6] {
-        let [all, trimmed, median] = errors(run);
-        println!(
-            "  {:66} {:4} iterations, {:5.1} s: MSE {all:.3e} (x{:.2}), without the worst 1 % {trimmed:.3e} (x{:.2}), \
-             median {median:.3e} (x{:.2})",
-            run.name,
-            run.iterations,
-            run.seconds,
-            all / ours[0],
-            trimmed / ours[1],
-            median / ours[2]
-        );
+    println!("{name}, {seconds} s each");
+    report("the mirror", &runs, &pixels);
+    // What plain picks all but miss.
+    let [with, without] = [&runs[last], &runs[1]].map(|run| run.luminances(&pixels));
+    let caustic: Vec<(u32, u32)> =
+        (0..pixels.len()).filter(|&i| with[i] > 1.5 * without[i]).map(|i| pixels[i]).collect();
+    if !caustic.is_empty() {
+        report("the caustic in the mirror", &runs, &caustic);
     }
 }
 
