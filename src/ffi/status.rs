@@ -9,6 +9,8 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 /// What a call returns: HRR_OK or one of HRR_ERROR_*. An integer, so that numbers of later versions stay defined.
 pub type HrrStatus = i32;
 
+// Numbers are never reused; those that are missing here are for calls to come.
+
 /// The call did what it says.
 pub const HRR_OK: HrrStatus = 0;
 /// An argument is NULL, out of its range or contradicts another.

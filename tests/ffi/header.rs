@@ -4,8 +4,7 @@ use std::fs;
 use std::path::Path;
 
 /// In the order in which a host meets them.
-const FILES: [&str; 8] =
-    ["status", "context", "segment", "cache", "lobe", "query", "batch", "aids"];
+const FILES: [&str; 8] = ["status", "context", "segment", "cache", "lobe", "query", "batch", "aids"];
 
 const HEAD: &str = "/* hrr.h - the C interface of libhrr: hierarchical Russian roulette for vertex connections.
  *
@@ -27,7 +26,7 @@ fn generated() -> String {
         after_includes: Some(version()),
         usize_is_size_t: true,
         style: cbindgen::Style::Both,
-        documentation_style: cbindgen::DocumentationStyle::C,
+        documentation_style: cbindgen::DocumentationStyle::C99,
         line_length: 110,
         tab_width: 2,
         function: cbindgen::FunctionConfig { prefix: Some("HRR_API".into()), ..Default::default() },

@@ -112,9 +112,7 @@ impl Cache {
             let at = offsets.as_mut_ptr();
             // SAFETY: all pointers are to locals of the sizes given.
             unsafe {
-                hrr_query_batch(
-                    context.0, self.0, queries.as_ptr(), 0, n, none.0, hits, capacity, at, none.1,
-                )
+                hrr_query_batch(context.0, self.0, queries.as_ptr(), 0, n, none.0, hits, capacity, at, none.1)
             }
         };
         let status = call(ptr::null_mut(), 0, &mut offsets);
