@@ -295,7 +295,7 @@ HrrStatus hrr_context_new(const struct HrrContextDesc *desc,
 // Adds a reference; NULL is allowed. Any thread.
 HRR_API void hrr_context_retain(struct HrrContext *context);
 
-// Gives up a reference; the last one ends the context's threads. NULL is allowed. Caches live on without their
+// Gives up a reference; the last one ends the context's threads and waits for that. NULL is allowed. Caches live on without their
 // context. Any thread.
 HRR_API
 void hrr_context_release(struct HrrContext *context);

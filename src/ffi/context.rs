@@ -7,6 +7,7 @@ use super::status::{Failure, HRR_ERROR_INTERNAL, HrrStatus, Outcome, guard};
 use super::tasks::HostThreads;
 use std::ffi::c_void;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::thread::{self, JoinHandle};
 
 /// A task of hrr_query_batch: call it once for each index, from any thread, all before parallel_for returns.
 pub type HrrTaskFn = Option<unsafe extern "C" fn(task_data: *mut c_void, index: u32)>;
@@ -33,7 +34,7 @@ pub struct HrrContextDesc {
 /// Threads and spare memory. May be used from any thread, by several at once. Opaque; see hrr_context_new.
 #[derive(Debug)]
 pub struct HrrContext {
-    pub(super) pool: rayon::ThreadPool,
+    pub(super) pool: Pool,
     pub(super) host: Option<HostThreads>,
     pub(super) spare: Arc<Spare>,
 }
@@ -67,6 +68,52 @@ impl Spare {
     }
 }
 
+/// Threads that have ended when it is dropped: the host may unload the library next.
+#[derive(Debug)]
+pub(super) struct Pool {
+    /// Not there while dropping only.
+    pool: Option<rayon::ThreadPool>,
+    threads: Vec<JoinHandle<()>>,
+}
+
+impl Pool {
+    fn new(count: usize) -> Outcome<Self> {
+        let mut threads = Vec::new();
+        let pool = rayon::ThreadPoolBuilder::new()
+            .num_threads(count)
+            .spawn_handler(|worker| {
+                let name = format!("hrr {}", worker.index());
+                threads.push(thread::Builder::new().name(name).spawn(|| worker.run())?);
+                Ok(())
+            })
+            .build()
+            .map_err(|e| Failure::new(HRR_ERROR_INTERNAL, format!("the thread pool: {e}")))?;
+        Ok(Self { pool: Some(pool), threads })
+    }
+
+    pub fn threads(&self) -> usize {
+        self.threads.len()
+    }
+
+    /// Runs work on one of the threads and waits for it.
+    pub fn install<T: Send>(&self, work: impl FnOnce() -> T + Send) -> T {
+        match &self.pool {
+            Some(pool) => pool.install(work),
+            None => work(),
+        }
+    }
+}
+
+impl Drop for Pool {
+    fn drop(&mut self) {
+        self.pool = None;
+        for thread in self.threads.drain(..) {
+            // A thread that panicked has ended, too.
+            let _ = thread.join();
+        }
+    }
+}
+
 /// Most threads of a pool.
 const MAX_THREADS: u32 = 4096;
 
@@ -76,11 +123,7 @@ impl HrrContext {
         if threads > MAX_THREADS {
             return Err(Failure::argument(format!("desc->threads is {threads}: at most {MAX_THREADS}")));
         }
-        let pool = rayon::ThreadPoolBuilder::new()
-            .num_threads(threads as usize)
-            .thread_name(|i| format!("hrr {i}"))
-            .build()
-            .map_err(|e| Failure::new(HRR_ERROR_INTERNAL, format!("the thread pool: {e}")))?;
+        let pool = Pool::new(threads as usize)?;
         let host = desc.and_then(|d| HostThreads::new(d.parallel_for, d.parallel_user));
         Ok(Self { pool, host, spare: Arc::default() })
     }
@@ -115,7 +158,7 @@ pub unsafe extern "C" fn hrr_context_retain(context: *mut HrrContext) {
     });
 }
 
-/// Gives up a reference; the last one ends the context's threads. NULL is allowed. Caches live on without their
+/// Gives up a reference; the last one ends the context's threads and waits for that. NULL is allowed. Caches live on without their
 /// context. Any thread.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn hrr_context_release(context: *mut HrrContext) {

@@ -64,7 +64,7 @@ impl HrrLobe {
             return Err(Failure::argument(message));
         }
         // Culling counts on an exact frame; the lobe does not tell y from -y.
-        let frame = if off <= FORGIVEN { Frame { x, y, z } } else { Frame::from_z_tangent(z.normalize(), x) };
+        let frame = if off <= EXACT { Frame { x, y, z } } else { Frame::from_z_tangent(z.normalize(), x) };
         Ok(Lobe::new(frame, self.alpha_x, self.alpha_y, self.weight))
     }
 }

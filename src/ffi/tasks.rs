@@ -72,7 +72,7 @@ pub(super) fn run(context: &HrrContext, count: usize, body: &(dyn Fn(usize) + Sy
     if let (Some(host), 1..) = (&context.host, count) {
         return host.run(count, body);
     }
-    if count <= 1 || context.pool.current_num_threads() == 1 {
+    if count <= 1 || context.pool.threads() == 1 {
         (0..count).for_each(body);
     } else {
         context.pool.install(|| (0..count).into_par_iter().with_max_len(1).for_each(body));

@@ -304,7 +304,7 @@ fn queries_go_on_while_others_build() {
 
 #[test]
 fn crooked_frames_are_mended() {
-    // The same hits with the tree and without it, though the frame is single precision and askew by 4e-4.
+    // The frame is single precision and askew by 4e-4: culling counts on an orthonormal one.
     let context = Context::new(1);
     let points = points(20_000);
     let cache = context.floats(&points);
@@ -319,6 +319,12 @@ fn crooked_frames_are_mended() {
         let ask = query(eye.to_array(), &lobe, 30.0, i);
         let hits = cache.hits(&ask, None);
         assert_eq!(hits, cache.hits(&ask, Some(&options(HRR_RULE_NESTED, true))));
+        let [x, z] = [x, z].map(DVec3::from_array);
+        let mended = [Lobe::new(Frame::from_z_tangent(z.normalize(), x), 1e-3, 1e-2, 1.0)];
+        for hit in &hits {
+            let offset = Vec3::from_array(points[hit.id as usize]).as_dvec3() - eye;
+            assert_eq!(hit.probability, roulette::probability(&mended, 30.0, offset));
+        }
         accepted += hits.len();
     }
     assert!(accepted > 100, "{accepted}");
