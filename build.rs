@@ -8,6 +8,10 @@ fn main() {
     if std::env::var("CARGO_CFG_TARGET_FAMILY").as_deref() != Ok("unix") {
         return;
     }
+    if std::env::var("CARGO_CFG_TARGET_OS").as_deref() == Ok("linux") {
+        // The C library exports its own functions only, not those of the libraries in it.
+        println!("cargo::rustc-cdylib-link-arg=-Wl,--exclude-libs,ALL");
+    }
     let mut directories: Vec<PathBuf> =
         std::env::var_os("DEP_EMBREE4_LIBDIR").map(PathBuf::from).into_iter().collect();
     #[cfg(feature = "oiio")]

@@ -34,6 +34,8 @@ pub mod connect;
 pub mod integrator;
 pub mod render;
 
+pub mod ffi;
+
 pub use error::{Error, Result};
 
 /// The example in the README, which the documentation tests run.

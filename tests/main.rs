@@ -20,3 +20,4 @@ mod visibility;
 mod determinism;
 mod layers;
 mod mis;
+mod ffi;

@@ -13,6 +13,12 @@ pub(super) struct Scratch {
     order: Vec<Placed>,
 }
 
+impl Scratch {
+    pub(super) fn bytes(&self) -> usize {
+        self.order.capacity() * size_of::<Placed>()
+    }
+}
+
 /// Vertices that one task handles at a time.
 const GRAIN: usize = 2048;
 

@@ -120,6 +120,11 @@ impl VertexBvh {
             + size_of_val(&self.node_masks[..])
     }
 
+    /// Bytes of the buffer that builds use and keep for the next one.
+    pub fn build_bytes(&self) -> usize {
+        self.scratch.bytes()
+    }
+
     /// Positions, indices and boxes are laid out; the root is the only node of the highest level. `None` when empty.
     pub fn root(&self) -> Option<NodeId> {
         (self.levels > 0).then(|| NodeId { level: self.levels as u32 - 1, index: 0 })

@@ -1,0 +1,121 @@
+//! Programs in C and C++ that use the library as hosts do: compiled, linked with the shared and with the static
+//! library, run. `CC` and `CXX` name the compilers (default: cc, c++).
+
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+const STRICT: [&str; 5] = ["-Wall", "-Wextra", "-pedantic", "-Werror", "-O1"];
+
+fn root() -> &'static Path {
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+}
+
+fn compiler(variable: &str, default: &str) -> Command {
+    Command::new(std::env::var_os(variable).unwrap_or_else(|| default.into()))
+}
+
+fn c() -> Command {
+    let mut command = compiler("CC", "cc");
+    command.arg("-std=c99").args(STRICT).arg("-I").arg(root().join("include"));
+    command
+}
+
+fn cpp(standard: &str) -> Command {
+    let mut command = compiler("CXX", "c++");
+    command.arg(format!("-std={standard}")).args(STRICT).arg("-I").arg(root().join("include"));
+    command
+}
+
+/// Where cargo puts the libraries of the build that this test belongs to.
+fn libraries() -> PathBuf {
+    let directory = std::env::current_exe().unwrap().parent().unwrap().to_owned();
+    assert!(directory.join("libhrr.so").exists(), "no libhrr.so in {}", directory.display());
+    directory
+}
+
+fn run(command: &mut Command) -> String {
+    let output = command.output().unwrap_or_else(|e| panic!("{command:?}: {e}"));
+    let text = String::from_utf8_lossy(&output.stdout).into_owned();
+    let errors = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{command:?}: {}\n{text}{errors}", output.status);
+    text
+}
+
+/// What a static libhrr needs beside itself: `cargo rustc --lib -- --print native-static-libs`.
+fn static_needs(command: &mut Command) {
+    for variable in ["EMBREE4_ROOT", "OIIO_ROOT"] {
+        if let Some(directory) = std::env::var_os(variable) {
+            let directory = Path::new(&directory).join("lib");
+            command.arg("-L").arg(&directory).arg(format!("-Wl,-rpath,{}", directory.display()));
+        }
+    }
+    command.arg("-Wl,--as-needed");
+    if cfg!(feature = "embree") {
+        command.arg("-lembree4");
+    }
+    if cfg!(feature = "oiio") {
+        command.args(["-lOpenImageIO", "-lOpenImageIO_Util", "-lstdc++"]);
+    }
+    command.args(["-lpthread", "-ldl", "-lm", "-lgcc_s", "-lc"]);
+}
+
+fn compile_and_run(mut compiler: Command, source: &str, shared: bool) {
+    let directory = tempfile::tempdir().unwrap();
+    let program = directory.path().join("program");
+    compiler.arg(root().join("examples/c").join(source)).arg("-o").arg(&program);
+    if shared {
+        compiler.arg("-L").arg(libraries()).arg("-lhrr").arg("-lpthread").arg("-lm");
+    } else {
+        compiler.arg("-Wl,--gc-sections").arg(libraries().join("libhrr.a"));
+        static_needs(&mut compiler);
+    }
+    run(&mut compiler);
+    let mut program = Command::new(program);
+    if shared {
+        program.env("LD_LIBRARY_PATH", libraries());
+    }
+    let text = run(&mut program);
+    assert!(text.ends_with("all is well\n"), "{text}");
+}
+
+#[test]
+fn headers_compile_alone() {
+    for header in ["hrr.h", "hrr.hpp"] {
+        let header = root().join("include").join(header);
+        if header.extension().unwrap() == "h" {
+            run(c().args(["-fsyntax-only", "-x", "c"]).arg(&header));
+        }
+        for standard in ["c++11", "c++17"] {
+            run(cpp(standard).args(["-fsyntax-only", "-x", "c++"]).arg(&header));
+        }
+    }
+}
+
+#[test]
+fn c_with_the_shared_library() {
+    compile_and_run(c(), "minimal.c", true);
+}
+
+#[test]
+fn c_with_the_static_library() {
+    compile_and_run(c(), "minimal.c", false);
+}
+
+#[test]
+fn cpp_with_the_shared_library() {
+    compile_and_run(cpp("c++11"), "minimal.cpp", true);
+}
+
+#[test]
+fn cpp_with_the_static_library() {
+    compile_and_run(cpp("c++17"), "minimal.cpp", false);
+}
+
+#[test]
+fn only_own_names_are_exported() {
+    let names = run(Command::new("nm")
+        .args(["-D", "--defined-only", "--format=just-symbols"])
+        .arg(libraries().join("libhrr.so")));
+    let foreign: Vec<_> = names.lines().filter(|name| !name.starts_with("hrr_")).collect();
+    assert!(foreign.is_empty() && names.lines().count() > 20, "{foreign:?}");
+}
