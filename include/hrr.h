@@ -358,8 +358,8 @@ HrrStatus hrr_cache_offset(const struct HrrCache *cache,
 //
 // normal: shading normal, either side. tangent: the direction that alpha_x goes along; NULL where the roughness is the
 // same all round. wo: towards the previous eye vertex. 3 numbers each, of unit length, world space. alpha_x, alpha_y:
-// GGX roughness alpha (not its root), in [0,1]. reflectance: Fresnel factor, or how much of this lobe is wanted, in
-// [0,1]; the lobe's weight is proportional to it and may be replaced. Any thread.
+// GGX roughness alpha (not its root), from 0 to 1. reflectance: Fresnel factor, or how much of this lobe is wanted,
+// from 0 to 1; the lobe's weight is proportional to it and may be replaced. Any thread.
 //
 // Errors: HRR_ERROR_INVALID_ARGUMENT, HRR_ERROR_NON_FINITE.
 HRR_API
@@ -465,7 +465,7 @@ HrrStatus hrr_query_visit(const struct HrrCache *cache,
                           struct HrrCounters *counters);
 
 // Answers query_count queries, which lie query_stride bytes apart (0 = packed), on the threads of the context or of
-// its parallel_for. Hits of query i are hits[offsets[i]] up to hits[offsets[i + 1]], as hrr_query would write them.
+// its parallel_for. The hits of query i, as hrr_query would write them, lie from entry i of offsets up to entry i + 1.
 // hits: room for hit_capacity, NULL when that is 0. offsets: room for query_count + 1.
 //
 // When there are more hits than fit, hits is left alone, offsets is written, its last entry says how many there are,

@@ -43,7 +43,7 @@ unsafe fn part(
 }
 
 /// Answers query_count queries, which lie query_stride bytes apart (0 = packed), on the threads of the context or of
-/// its parallel_for. Hits of query i are hits[offsets[i]] up to hits[offsets[i + 1]], as hrr_query would write them.
+/// its parallel_for. The hits of query i, as hrr_query would write them, lie from entry i of offsets up to entry i + 1.
 /// hits: room for hit_capacity, NULL when that is 0. offsets: room for query_count + 1.
 ///
 /// When there are more hits than fit, hits is left alone, offsets is written, its last entry says how many there are,

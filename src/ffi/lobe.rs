@@ -149,8 +149,8 @@ fn roughness(alpha_x: f64, alpha_y: f64) -> Outcome<(f64, f64)> {
 ///
 /// normal: shading normal, either side. tangent: the direction that alpha_x goes along; NULL where the roughness is the
 /// same all round. wo: towards the previous eye vertex. 3 numbers each, of unit length, world space. alpha_x, alpha_y:
-/// GGX roughness alpha (not its root), in [0,1]. reflectance: Fresnel factor, or how much of this lobe is wanted, in
-/// [0,1]; the lobe's weight is proportional to it and may be replaced. Any thread.
+/// GGX roughness alpha (not its root), from 0 to 1. reflectance: Fresnel factor, or how much of this lobe is wanted,
+/// from 0 to 1; the lobe's weight is proportional to it and may be replaced. Any thread.
 ///
 /// Errors: HRR_ERROR_INVALID_ARGUMENT, HRR_ERROR_NON_FINITE.
 #[unsafe(no_mangle)]
