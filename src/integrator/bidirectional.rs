@@ -151,7 +151,8 @@ impl<'a> Bidirectional<'a> {
         let mut tally = Tally { light_subpaths: subpaths.end - subpaths.start, ..Tally::default() };
         cache.clear();
         for index in subpaths {
-            let sampler = Sampler::new(self.settings.seed, iteration, stream, index);
+            let sampler =
+                Sampler::in_family(self.settings.seed, iteration, stream, index >> 32, index as u32);
             let mut walk = self.techniques.emit(world, &sampler);
             while let Some(light) = walk.filter(|light| light.depth < self.settings.max_depth) {
                 if !light.vertex.bsdf.is_delta() {
