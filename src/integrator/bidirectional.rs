@@ -3,6 +3,7 @@
 use super::merging;
 use super::recipe::{Base, Recipe};
 use super::records::Records;
+use super::spread::{Adaptive, Seen};
 use super::tile::{self, Sample};
 use super::{Integrator, Size};
 use crate::connect::{self, EyeVertex};
@@ -13,7 +14,7 @@ use crate::material::Material;
 use crate::math::Spectrum;
 use crate::roulette::{self, Query};
 use crate::sampler::{Purpose, Sampler, Stream};
-use crate::settings::{Guiding, Settings};
+use crate::settings::{Settings, Switch};
 use crate::subpath::{Origin, Storing, Walk, World};
 use crate::tally::{Clock, Tally};
 use crate::techniques::{Merging, Roulette, Techniques};
@@ -50,6 +51,7 @@ pub struct Bidirectional<'a> {
     picks: LightCache,
     pub(super) bvh: VertexBvh,
     records: Records,
+    adaptive: Option<Adaptive>,
 }
 
 impl<'a> Bidirectional<'a> {
@@ -67,6 +69,7 @@ impl<'a> Bidirectional<'a> {
             picks: LightCache::default(),
             bvh: VertexBvh::new(),
             records: Records::default(),
+            adaptive: None,
         };
         machine.resize(Size::of(settings, &world.scene.film))?;
         Ok(machine)
@@ -234,35 +237,37 @@ impl<'a> Bidirectional<'a> {
     }
 
     /// What an eye sample sees.
-    fn radiance(&self, sample: &Sample, clock: Clock, tally: &mut Tally) -> Spectrum {
+    fn radiance(&self, sample: &Sample, clock: Clock, tally: &mut Tally) -> Seen {
         let (world, techniques) = (self.world, &self.techniques);
-        let mut sum = Spectrum::ZERO;
+        let (mut rest, mut kept) = (Spectrum::ZERO, Spectrum::ZERO);
         let mut eye = EyeVertex::first(world, techniques, sample.raster);
         while let Some(vertex) = eye {
-            sum += vertex.emitted(world, techniques);
+            rest += vertex.emitted(world, techniques);
             if !self.recipe.eye_subpaths || vertex.walk.depth == self.settings.max_depth {
                 break;
             }
             if !vertex.walk.vertex.bsdf.is_delta() {
-                sum += self.next_event(&vertex, sample, clock, tally);
-                sum += if !vertex.lobes.is_empty() {
-                    let mut kept = Spectrum::ZERO;
-                    self.play_roulette(&vertex, &sample.sampler, clock, tally, &mut |_, value| kept += value);
-                    kept
+                rest += self.next_event(&vertex, sample, clock, tally);
+                if !vertex.lobes.is_empty() {
+                    if sample.plays > 0.0 {
+                        let sampler = &sample.sampler;
+                        self.play_roulette(&vertex, sampler, clock, tally, &mut |_, value| kept += value);
+                    }
                 } else {
-                    match self.recipe.base {
+                    rest += match self.recipe.base {
                         Base::Off => Spectrum::ZERO,
                         Base::OwnPath => self.connect_own_path(&vertex, sample, clock, tally),
                         Base::Uniform | Base::Probabilistic => {
                             self.connect_picks(&vertex, sample, clock, tally)
                         }
-                    }
-                };
-                sum += self.merge(&vertex, tally);
+                    };
+                }
+                rest += self.merge(&vertex, tally);
             }
             eye = vertex.next(world, techniques, &sample.sampler);
         }
-        sum
+        let roulette = kept * sample.plays;
+        Seen { radiance: rest + roulette, roulette }
     }
 
     /// Counts a connection's value if its ray is free.
@@ -391,11 +396,21 @@ impl Integrator for Bidirectional<'_> {
             light_subpaths: if self.recipe.base == Base::OwnPath { all } else { size.light_subpaths },
             ..size
         };
-        if self.recipe.roulette && self.settings.guiding == Guiding::On && !self.nothing_glossy() {
+        if self.recipe.roulette && self.settings.guiding == Switch::On && !self.nothing_glossy() {
             self.learn_guide()?;
         }
         self.plan();
+        if let Some(adaptive) = &mut self.adaptive {
+            adaptive.plan(size.samples);
+        }
         Ok(())
+    }
+
+    fn adapt(&mut self) {
+        // Eye samples that have a light subpath of their own are as many as these.
+        if self.recipe.base != Base::OwnPath && self.recipe.eye_subpaths {
+            self.adaptive = Some(Adaptive::new(&self.world.scene.film));
+        }
     }
 
     fn iterate(&mut self, iteration: u64, film: &mut Film, progress: &(dyn Fn(f64) + Sync)) -> Result<Tally> {
@@ -418,9 +433,12 @@ impl Integrator for Bidirectional<'_> {
         tally.sides[0] = start.elapsed().as_secs_f64();
         let (start, key) = (Instant::now(), (self.settings.seed, iteration, self.size.samples));
         let on_eye_side = |fraction| progress(LIGHT_SHARE + (1.0 - LIGHT_SHARE) * fraction);
-        tally.add(&tile::sample_film(film, key, &on_eye_side, |sample, clock, tally| {
+        // Set aside, since the samples look at the rest of the machine.
+        let mut adaptive = self.adaptive.take();
+        tally.add(&tile::sample_film(film, key, adaptive.as_mut(), &on_eye_side, |sample, clock, tally| {
             self.radiance(sample, clock, tally)
         }));
+        self.adaptive = adaptive;
         tally.sides[1] = start.elapsed().as_secs_f64();
         film.count_samples(u64::from(self.size.samples));
         Ok(tally)

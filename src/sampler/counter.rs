@@ -36,6 +36,8 @@ pub enum Stream {
     GuideLight = 5,
     /// Eye subpaths of that.
     GuideEye = 6,
+    /// What all samples of a pixel share.
+    Pixel = 7,
 }
 
 /// What a number decides at a vertex.
