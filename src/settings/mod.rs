@@ -4,7 +4,7 @@
 mod choices;
 mod table;
 
-pub use choices::{Backend, Guiding, Heuristic, Integrator};
+pub use choices::{Backend, Heuristic, Integrator, Switch};
 pub use table::TABLE;
 
 use crate::error::{Error, Place};
@@ -20,6 +20,8 @@ pub struct Settings {
     pub visibility: Backend,
     /// Iterations to run (each `samples` eye samples per pixel).
     pub iterations: u64,
+    /// Most memory for light vertices where they are not set, 1e9 bytes; 0 = half of the machine's.
+    pub memory: f64,
     /// First iteration's number, so that a render can be split and added up.
     pub first_iteration: u64,
     /// Seconds of rendering instead of a number of iterations.
@@ -28,9 +30,9 @@ pub struct Settings {
     pub seed: u64,
     /// Threads; 0 = all.
     pub threads: usize,
-    /// Eye samples per pixel and iteration.
+    /// Eye samples per pixel and iteration; 0 = what suits the time, else 1.
     pub samples: u32,
-    /// Light subpaths per iteration; 0 = as many as pixels.
+    /// Light subpaths per iteration; 0 = what suits time and memory, else as many as eye samples.
     pub light_subpaths: u64,
     /// Connections that the uniform picks (`lvc`) try at each eye vertex.
     pub connections: u32,
@@ -41,7 +43,9 @@ pub struct Settings {
     /// Probability of storing a light vertex whose predecessor does not scatter narrowly, where the roulette plays.
     pub storing: f64,
     /// Whether light subpaths are sent where earlier ones proved useful to the roulette.
-    pub guiding: Guiding,
+    pub guiding: Switch,
+    /// Whether eye samples go to the pixels that need them, where the renderer chooses their number.
+    pub adaptive: Switch,
     /// How techniques that find the same path share its weight.
     pub mis: Heuristic,
     /// Light subpaths that probabilistic connections (`pcbpt`) choose from.
@@ -63,17 +67,19 @@ impl Default for Settings {
             max_depth: 24,
             visibility: Backend::BEST,
             iterations: 64,
+            memory: 0.0,
             first_iteration: 0,
             time: None,
             seed: 0,
             threads: 0,
-            samples: 1,
+            samples: 0,
             light_subpaths: 0,
             connections: 1,
             expected: 1.0,
             hrr_alpha: 0.3,
             storing: 0.05,
-            guiding: Guiding::On,
+            guiding: Switch::On,
+            adaptive: Switch::On,
             mis: Heuristic::Balance,
             reused_subpaths: 100,
             record_spacing: 8,
