@@ -78,7 +78,7 @@ mod tests {
             let key = mix(k + 1);
             let mut seen = vec![0; n as usize];
             for i in first..first + n {
-                seen[(u64::from(Place::new(i).point1(key)) * u64::from(n) >> 32) as usize] += 1;
+                seen[((u64::from(Place::new(i).point1(key)) * u64::from(n)) >> 32) as usize] += 1;
             }
             assert!(seen.iter().all(|&c| c == 1), "{n} points in one dimension: {seen:?}");
             for across in 0..=log {
