@@ -1,6 +1,7 @@
 //! What the fuzzer runs (docs/fuzzing.md), on bytes from a random number generator.
 
 use crate::support::Random;
+use crate::support::calls_of_bytes;
 use crate::support::query_of_bytes::check;
 
 /// A string of up to `most` bytes whose first is `what`.
@@ -33,5 +34,17 @@ fn no_bytes_and_few() {
         check(&[what, 3, 10]);
         check(&[what; 100]);
         check(&[what; 1000]);
+    }
+}
+
+#[test]
+fn any_bytes_as_calls_of_the_c_interface() {
+    let mut rng = Random::new(0xca11);
+    let found: usize = (0..1500).map(|i| calls_of_bytes::check(&bytes(&mut rng, i as u8, 3000.0))).sum();
+    // Random calls must really find something.
+    assert!(found > 1000, "{found}");
+    calls_of_bytes::check(&[]);
+    for what in 0..=255 {
+        calls_of_bytes::check(&[what; 500]);
     }
 }
