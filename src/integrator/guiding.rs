@@ -43,7 +43,7 @@ impl Bidirectional<'_> {
         let (world, seed) = (self.world, self.settings.seed);
         let observations = found.into_iter().flatten().filter_map(|(vertex, score)| {
             let subpath = self.cache.subpath_of(vertex as usize) as u64;
-            let sampler = Sampler::new(seed, 0, Stream::GuideLight, subpath);
+            let sampler = Sampler::in_family(seed, 0, Stream::GuideLight, subpath >> 32, subpath as u32);
             let (emitter, direction) = from_light::start(world, None, &sampler)?;
             Some((emitter, direction, score))
         });
