@@ -40,11 +40,13 @@ fn no_bytes_and_few() {
 #[test]
 fn any_bytes_as_calls_of_the_c_interface() {
     let mut rng = Random::new(0xca11);
-    let found: usize = (0..1500).map(|i| calls_of_bytes::check(&bytes(&mut rng, i as u8, 3000.0))).sum();
+    // An interpreter gets through fewer (docs/fuzzing.md).
+    let (strings, step) = if cfg!(miri) { (30, 51) } else { (1500, 1) };
+    let found: usize = (0..strings).map(|i| calls_of_bytes::check(&bytes(&mut rng, i as u8, 3000.0))).sum();
     // Random calls must really find something.
-    assert!(found > 1000, "{found}");
+    assert!(found > strings / 2, "{found}");
     calls_of_bytes::check(&[]);
-    for what in 0..=255 {
+    for what in (0..=255).step_by(step) {
         calls_of_bytes::check(&[what; 500]);
     }
 }
