@@ -2,17 +2,19 @@
 
 pub mod counters;
 pub mod observer;
+mod sizing;
 
 pub use counters::{Counters, Memory, Seconds, Stats};
 pub use observer::{Observer, Progress, Silent};
 
 use crate::error::{Error, Result};
 use crate::film::Film;
-use crate::integrator;
+use crate::integrator::{self, Size};
 use crate::scene::Scene;
 use crate::settings::{Integrator, Settings};
 use crate::subpath::World;
 use crate::tally::Tally;
+use sizing::{Measured, Sizing};
 use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Instant;
@@ -24,6 +26,8 @@ pub struct Outcome {
     pub film: Film,
     /// What was done and what it cost. `seconds.load` and `seconds.total` are for the caller to fill in.
     pub stats: Stats,
+    /// Sizes that were chosen for iterations, with what each counts for; empty where the settings say them.
+    pub sizes: Vec<(Size, u32)>,
     /// Whether the observer ended it.
     pub interrupted: bool,
 }
@@ -50,6 +54,9 @@ fn run(scene: &Scene, settings: &Settings, observer: &dyn Observer) -> Result<Ou
     if world.lights.is_empty() {
         observer.warn("nothing in the scene emits light: the image is black");
     }
+    let mut size = Size::of(&settings, &scene.film);
+    let sizing = Sizing::new(&settings, &scene.film);
+    let mut sizes: Vec<(Size, u32)> = sizing.iter().map(|_| (size, 1)).collect();
     let mut integrator = integrator::new(&world, &settings)?;
     let mut film = Film::new(&scene.film);
     let mut tally = Tally::default();
@@ -80,11 +87,20 @@ fn run(scene: &Scene, settings: &Settings, observer: &dyn Observer) -> Result<Ou
             });
         };
         progress(0.0);
-        tally.add(&integrator.iterate(settings.first_iteration + finished, &mut film, &progress)?);
+        let done = integrator.iterate(settings.first_iteration + finished, &mut film, &progress)?;
+        tally.add(&done);
         finished += 1;
         accepted.store(tally.roulette.accepted, Ordering::Relaxed);
         let (cache, tree) = integrator.bytes();
         bytes = (bytes.0.max(cache), bytes.1.max(tree));
+        if let Some(sizing) = &sizing {
+            let measured = Measured { size, tally: done, bytes: cache + tree };
+            let Some((next, weight)) = sizing.next(start.elapsed().as_secs_f64(), &measured) else { break };
+            size = next;
+            integrator.resize(size)?;
+            film.set_weight(weight);
+            sizes.push((size, weight));
+        }
     }
     let render = start.elapsed().as_secs_f64();
     if film.dropped() > 0 {
@@ -132,7 +148,8 @@ fn run(scene: &Scene, settings: &Settings, observer: &dyn Observer) -> Result<Ou
             vertex_bvh_bytes: bytes.1 as u64,
         },
     };
-    Ok(Outcome { film, stats, interrupted })
+    sizes.truncate(usize::try_from(finished).unwrap_or(usize::MAX));
+    Ok(Outcome { film, stats, sizes, interrupted })
 }
 
 /// What `auto` stands for: the least machinery that finds all of the scene's light.

@@ -6,6 +6,7 @@ use crate::progress::Reporter;
 use hrr::error::Place;
 use hrr::file;
 use hrr::image::{self, Attributes, Format};
+use hrr::integrator::Size;
 use hrr::render::counters::{Stats, peak_rss_bytes};
 use hrr::scene::Scene;
 use hrr::settings::{SettingError, Settings};
@@ -48,7 +49,10 @@ pub fn run(args: &RenderArgs, log: &Log) -> Result<u8> {
     }
     stats.seconds.load = load;
     let image = outcome.film.image();
-    let attributes = attributes(&scene, &settings, &stats, outcome.film.samples());
+    let mut attributes = attributes(&scene, &settings, &stats, outcome.film.samples());
+    if !outcome.sizes.is_empty() {
+        attributes.set("hrr:sizes", sizes(&outcome.sizes));
+    }
     // One bad disk does not keep the image from the others.
     let written = args.outputs.iter().map(|path| match Format::of(path)? {
         Format::Exr => image::write(path, &image, &attributes),
@@ -61,6 +65,9 @@ pub fn run(args: &RenderArgs, log: &Log) -> Result<u8> {
     written.into_iter().chain([reported]).collect::<Result<()>>()?;
 
     details(&stats, log);
+    if !outcome.sizes.is_empty() {
+        log.detail(format_args!("{:>20}  {}", "sizes", sizes(&outcome.sizes)));
+    }
     summary(args, &stats, outcome.interrupted, log);
     Ok(if outcome.interrupted { INTERRUPTED } else { 0 })
 }
@@ -114,6 +121,13 @@ fn attributes(scene: &Scene, settings: &Settings, stats: &Stats, samples: u64) -
     // No integrator of today drops a kind of path.
     a.set("hrr:biased", 0u64);
     a
+}
+
+/// Samples x light subpaths of each iteration, and what it counts for.
+fn sizes(sizes: &[(Size, u32)]) -> String {
+    let words: Vec<String> =
+        sizes.iter().map(|(s, weight)| format!("{}x{}*{weight}", s.samples, s.light_subpaths)).collect();
+    words.join(" ")
 }
 
 fn is_stdout(path: &Path) -> bool {
