@@ -77,7 +77,7 @@ mod tests {
             let key = keys(k);
             let mut seen = vec![0; n as usize];
             for i in first..first + n {
-                seen[(u64::from(point1(i, key[0])) * u64::from(n) >> 32) as usize] += 1;
+                seen[((u64::from(point1(i, key[0])) * u64::from(n)) >> 32) as usize] += 1;
             }
             assert!(seen.iter().all(|&c| c == 1), "{n} points in one dimension: {seen:?}");
             for across in 0..=log {
