@@ -73,6 +73,7 @@ pub struct HrrCache {
 #[derive(Debug, Default)]
 pub(super) struct Storage {
     pub bvh: VertexBvh,
+    /// Empty where every id is the vertex' index: a look-up less for each hit.
     pub ids: Vec<u64>,
     pub origin: DVec3,
     pub held: Option<Held>,
@@ -81,6 +82,12 @@ pub(super) struct Storage {
 impl Storage {
     fn bytes(&self) -> u64 {
         (self.bvh.bytes() + self.bvh.build_bytes() + size_of_val(&self.ids[..])) as u64
+    }
+
+    /// The id of the vertex with an index.
+    #[inline(always)]
+    pub fn id(&self, index: u32) -> u64 {
+        if self.ids.is_empty() { index.into() } else { self.ids[index as usize] }
     }
 }
 
@@ -159,6 +166,9 @@ impl HrrCache {
             let Gathered { positions, masks, ids, .. } = &mut gathered;
             let masks = (!masks.is_empty()).then_some(&masks[..]);
             storage.bvh.build_masked(positions, masks)?;
+            if (0..).zip(&ids[..]).all(|(index, &id): (u64, _)| index == id) {
+                ids.clear();
+            }
             std::mem::swap(&mut storage.ids, ids);
             source.progress.at(1.0)
         };
@@ -194,7 +204,7 @@ impl HrrCache {
 
     /// What queries can see, in one number.
     pub(super) fn fingerprint(&self) -> u64 {
-        let Storage { bvh, ids, origin, .. } = &self.storage;
+        let Storage { bvh, origin, .. } = &self.storage;
         let mut hash = Xxh3::new();
         origin.to_array().iter().for_each(|x| hash.update(&x.to_bits().to_le_bytes()));
         for (i, block) in bvh.blocks().iter().enumerate() {
@@ -203,7 +213,7 @@ impl HrrCache {
                 for axis in block.position {
                     hash.update(&axis[lane].to_bits().to_le_bytes());
                 }
-                hash.update(&ids[block.index[lane] as usize].to_le_bytes());
+                hash.update(&self.storage.id(block.index[lane]).to_le_bytes());
                 hash.update(&bvh.masks(node).map_or(u32::MAX, |masks| masks[lane]).to_le_bytes());
             }
         }
@@ -356,7 +366,7 @@ pub unsafe extern "C" fn hrr_cache_validate(cache: *const HrrCache) -> HrrStatus
         let cache = unsafe { pointer::object(cache, "cache") }?;
         cache.storage.bvh.validate()?;
         let (ids, vertices) = (cache.storage.ids.len(), cache.storage.bvh.len());
-        if ids != vertices {
+        if ids != 0 && ids != vertices {
             return Err(Failure::new(HRR_ERROR_INTERNAL, format!("{ids} ids for {vertices} light vertices")));
         }
         Ok(())

@@ -14,7 +14,7 @@ const MAGIC: &[u8; 8] = b"HRRCACH1";
 /// The bytes of a cache, little-endian throughout.
 pub(super) fn write(cache: &HrrCache) -> Vec<u8> {
     let bvh = &cache.storage.bvh;
-    let mut bytes = Vec::with_capacity(72 + cache.storage.ids.len() * 24);
+    let mut bytes = Vec::with_capacity(72 + bvh.len() * 24);
     bytes.extend(MAGIC);
     bytes.extend((bvh.len() as u64).to_le_bytes());
     bytes.extend(u64::from(cache.masked()).to_le_bytes());
@@ -23,7 +23,7 @@ pub(super) fn write(cache: &HrrCache) -> Vec<u8> {
     bytes.extend(cache.fingerprint().to_le_bytes());
     let (positions, masks) = in_order(bvh);
     bytes.extend(positions.iter().flat_map(|p| p.to_array()).flat_map(|x| x.to_bits().to_le_bytes()));
-    bytes.extend(cache.storage.ids.iter().flat_map(|id| id.to_le_bytes()));
+    bytes.extend((0..bvh.len() as u32).flat_map(|index| cache.storage.id(index).to_le_bytes()));
     if cache.masked() {
         bytes.extend(masks.iter().flat_map(|mask| mask.to_le_bytes()));
     }

@@ -154,15 +154,16 @@ pub(super) unsafe fn run(
     if ask.mask == 0 {
         return Err(Failure::argument("query->mask is 0: no light vertex shares a bit with it"));
     }
+    let mut read = Lobes::default();
     // SAFETY: passed on.
-    let lobes = unsafe { Lobes::read(ask.lobes, ask.lobe_count) }?;
+    let lobes = unsafe { read.read(ask.lobes, ask.lobe_count) }?;
     let constant = constant(ask.constant)?;
-    let mut inner = Query::new(cache.relative(position), lobes.get(), constant, ask.key);
+    let mut inner = Query::new(cache.relative(position), lobes, constant, ask.key);
     (inner.mask, inner.rule) = (ask.mask, options.rule);
-    let (bvh, ids) = (&cache.storage.bvh, &cache.storage.ids);
+    let bvh = &cache.storage.bvh;
     let (captured, mut seen) = (cache.capture.is_on(), Seen::default());
     let mut found = |index: u32, probability| {
-        let id = ids[index as usize];
+        let id = cache.storage.id(index);
         if captured {
             seen.add(id, probability);
         }
@@ -175,7 +176,7 @@ pub(super) unsafe fn run(
     }
     if captured {
         let Options { rule, brute_force } = options;
-        cache.capture.record(&Made { cache, ask, lobes: lobes.get(), rule, brute_force, seen });
+        cache.capture.record(&Made { cache, ask, lobes, rule, brute_force, seen });
     }
     Ok(())
 }
