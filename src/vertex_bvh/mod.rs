@@ -9,6 +9,7 @@
 mod ball;
 mod build;
 mod kd;
+mod validate;
 
 use crate::math::Aabb;
 use glam::Vec3;
