@@ -1,7 +1,7 @@
 //! How often each technique tries a path, and with which lobes the roulette judges light vertices.
 
 use crate::bsdf::Transport;
-use crate::light::{EmissionGuide, EmitterPoint};
+use crate::light::{EmissionGuide, LightPoint};
 use crate::math::luminance;
 use crate::mis::Heuristic;
 use crate::roulette::{self, Lobe};
@@ -18,7 +18,7 @@ use std::sync::Arc;
 pub struct Techniques {
     /// How they share a path.
     pub heuristic: Heuristic,
-    /// m_0: the eye subpath hits an emitter.
+    /// m_0: the eye subpath hits an emitter, or the sky. (No eye subpath hits lamps without size.)
     pub eye_hits: f64,
     /// m_1: next-event estimation, relative to emission, which draws its points from the same density.
     pub next_event: f64,
@@ -173,12 +173,18 @@ impl Techniques {
         }
     }
 
-    /// Density of a light subpath's first direction, 1/sr.
-    pub fn emission_pdf_w(&self, emitter: &EmitterPoint, direction: DVec3) -> f64 {
+    /// Density of the light subpath that leaves a light in a direction for the surface point `first`: 1/sr; of distant
+    /// light 1/m^2 across it.
+    pub fn emission_pdf(&self, world: &World<'_>, light: &LightPoint, direction: DVec3, first: DVec3) -> f64 {
         match &self.guide {
-            None => emitter.pdf_w(direction),
-            Some(guide) => guide.pdf_w(emitter, direction),
+            None => light.emission_pdf(world.lights.surroundings(), direction),
+            Some(guide) => guide.pdf(light, direction, first),
         }
+    }
+
+    /// How often an eye subpath that could end on a light tries.
+    pub fn eye_hits(&self, light: &LightPoint) -> f64 {
+        if light.is_delta() { 0.0 } else { self.eye_hits }
     }
 
     /// Starts a light subpath.

@@ -9,6 +9,7 @@ mod support;
 
 mod bsdf;
 mod light;
+mod light_sources;
 mod warps;
 mod image;
 mod settings;

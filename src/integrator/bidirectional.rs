@@ -5,7 +5,7 @@ use super::merging;
 use super::recipe::{Base, Recipe};
 use super::records::Records;
 use super::tile::{self, Sample};
-use crate::connect::{self, EyeVertex};
+use crate::connect::{self, EyeVertex, Onward};
 use crate::error::Result;
 use crate::film::Film;
 use crate::light_cache::LightCache;
@@ -164,7 +164,7 @@ impl<'a> Bidirectional<'a> {
                     }
                     if let Some(film) = film.filter(|_| self.recipe.light_image)
                         && let Some((raster, value, ray)) =
-                            connect::connect_camera(world, &self.techniques, &light)
+                            connect::connect_camera(world, &self.techniques, &light, &sampler)
                         && tally.connection(!world.visibility.occluded(&ray))
                     {
                         film.add(raster, value);
@@ -212,8 +212,8 @@ impl<'a> Bidirectional<'a> {
     fn radiance(&self, sample: &Sample, clock: Clock, tally: &mut Tally) -> Spectrum {
         let (world, techniques) = (self.world, &self.techniques);
         let mut sum = Spectrum::ZERO;
-        let mut eye = EyeVertex::first(world, techniques, sample.raster);
-        while let Some(vertex) = eye {
+        let mut eye = EyeVertex::first(world, techniques, sample.raster, &sample.sampler);
+        while let Onward::Vertex(vertex) = eye {
             sum += vertex.emitted(world, techniques);
             if !self.recipe.eye_subpaths || vertex.walk.depth == self.settings.max_depth {
                 break;
@@ -236,6 +236,9 @@ impl<'a> Bidirectional<'a> {
                 sum += self.merge(&vertex, tally);
             }
             eye = vertex.next(world, techniques, &sample.sampler);
+        }
+        if let Onward::Sky(light) = eye {
+            sum += light;
         }
         sum
     }

@@ -11,7 +11,7 @@ const NOT_EMITTING: u32 = u32::MAX;
 
 /// All emitting triangles of a scene.
 #[derive(Debug, Clone, Default)]
-pub struct Lights {
+pub struct AreaLights {
     emitters: Vec<Emitter>,
     pick: Discrete,
     of_triangle: Vec<u32>,
@@ -45,7 +45,7 @@ pub struct EmitterPoint {
     pub emitter: u32,
 }
 
-impl Lights {
+impl AreaLights {
     /// Collects the emitting triangles. Degenerate ones emit nothing.
     pub fn new(mesh: &Mesh, materials: &[Material]) -> Self {
         let mut emitters = Vec::new();
@@ -85,6 +85,16 @@ impl Lights {
     /// True when nothing emits.
     pub fn is_empty(&self) -> bool {
         self.emitters.is_empty()
+    }
+
+    /// Luminance of all their light, W.
+    pub(super) fn power(&self) -> f64 {
+        self.pick.total()
+    }
+
+    /// Makes room for other lights, which get the rest of all picks.
+    pub(super) fn scale_densities(&mut self, share: f64) {
+        self.emitters.iter_mut().for_each(|e| e.pdf_a *= share);
     }
 
     /// Number of emitting triangles.

@@ -1,10 +1,11 @@
 //! A scene made ready for rays.
 
+use super::Storing;
 use crate::bsdf::Bsdf;
 use crate::camera::Camera;
 use crate::error::Result;
 use crate::geometry::SurfacePoint;
-use crate::light::Lights;
+use crate::light::{LightPoint, Lights};
 use crate::scene::Scene;
 use crate::settings::Settings;
 use crate::visibility::{self, Ray, Visibility};
@@ -14,7 +15,7 @@ use glam::{DVec2, DVec3};
 pub struct World<'a> {
     /// Triangles and materials.
     pub scene: &'a Scene,
-    /// Emitting triangles.
+    /// Emitting triangles and other lights.
     pub lights: Lights,
     /// The camera.
     pub camera: Camera,
@@ -31,7 +32,7 @@ impl<'a> World<'a> {
         scene.mesh.validate()?;
         Ok(Self {
             scene,
-            lights: Lights::new(&scene.mesh, &scene.materials),
+            lights: Lights::new(&scene.mesh, &scene.materials, &scene.lights),
             camera: Camera::new(&scene.camera, (scene.film.width, scene.film.height), scene.mesh.origin)?,
             visibility: visibility::build(settings.visibility, &scene.mesh, settings.threads)?,
         })
@@ -40,6 +41,15 @@ impl<'a> World<'a> {
     /// The scattering model of a triangle, but for its texture.
     pub fn bsdf_of(&self, triangle: u32) -> Bsdf {
         self.scene.materials[self.scene.mesh.materials[triangle as usize] as usize].bsdf(DVec2::ZERO)
+    }
+
+    /// Whether the surface of a light scatters narrowly. Light from a lamp without surface does not count as a caustic:
+    /// next-event estimation finds it.
+    pub fn is_narrow(&self, storing: &Storing, light: &LightPoint) -> bool {
+        match light {
+            LightPoint::Surface(emitter) => storing.is_narrow(&self.bsdf_of(emitter.point.triangle)),
+            _ => false,
+        }
     }
 
     /// The surface point that a ray meets first. `origin` and unit `direction` are the ray in full precision, before

@@ -5,11 +5,14 @@ use hrr::bsdf::Reflectance;
 use hrr::camera::CameraSettings;
 use hrr::film::FilmSettings;
 use hrr::geometry::Mesh;
+use hrr::image::Image;
+use hrr::light::LightSource;
 use hrr::material::{Material, Scattering};
 use hrr::math::Spectrum;
 use hrr::scene::Scene;
 use hrr::settings::Settings;
 use std::path::Path;
+use std::sync::Arc;
 
 /// A scene of the project with some keys changed.
 pub fn load(name: &str, overrides: &[(&str, &str)]) -> Scene {
@@ -48,12 +51,34 @@ pub fn box_of_everything() -> Scene {
     in_memory(mesh, materials, DVec3::new(0.1, 0.0, 2.6), DVec3::new(0.0, -0.1, 0.0), 60.0)
 }
 
+/// A point and a spot light in the box, a sun and an uneven sky in front of it.
+pub fn lights_of_every_kind() -> Vec<LightSource> {
+    let sky = |i: u32| Vec3::splat(0.2 + (i % 7) as f32 * 0.3) * Vec3::new(1.0, 1.2, 1.5);
+    let image = Image { width: 16, height: 8, pixels: (0..16 * 8).map(sky).collect() };
+    vec![
+        LightSource::Point { position: DVec3::new(0.6, 0.3, 0.4), intensity: Spectrum::new(0.5, 0.4, 0.3) },
+        LightSource::Spot {
+            position: DVec3::new(-0.2, 0.5, 0.6),
+            direction: DVec3::new(-0.3, -1.0, -0.5).normalize(),
+            intensity: Spectrum::new(1.0, 2.0, 1.0),
+            inner: 0.4,
+            outer: 0.7,
+        },
+        LightSource::Directional {
+            direction: DVec3::new(-0.2, -0.4, -1.0).normalize(),
+            irradiance: Spectrum::new(1.0, 0.9, 0.8),
+        },
+        LightSource::Environment { color: Spectrum::splat(0.8), image: Some(Arc::new(image)) },
+    ]
+}
+
 /// A scene of 32x32 pixels, as loaded from nowhere.
 pub fn in_memory(mesh: Mesh, materials: Vec<Material>, origin: DVec3, target: DVec3, fov_y: f64) -> Scene {
     Scene {
         path: "memory".into(),
         mesh,
         materials,
+        lights: Vec::new(),
         camera: CameraSettings { origin, target, fov_y, ..CameraSettings::default() },
         film: FilmSettings { width: 32, height: 32, ..FilmSettings::default() },
         settings: Settings::default(),
