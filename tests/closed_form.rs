@@ -168,7 +168,8 @@ fn lamps_without_size_light_a_plate() {
     // The middle lies off the spot's axis, where three quarters of the way in the cosine give 27/32.
     let axis = DQuat::from_rotation_z(0.3) * direction;
     let (inner, outer) = ((0.3f64.cos() + 0.03).acos(), (0.3f64.cos() - 0.09).acos());
-    let settings = Settings { iterations: 16, samples: 16, ..Settings::default() };
+    // Merging takes a share of the light that it seldom finds: here nearly none.
+    let settings = Settings { iterations: 16, samples: 16, merge_radius: 1e-8, ..Settings::default() };
     for (name, light, radiance) in [
         ("point", LightSource::Point { position, intensity }, by_lamp),
         (
@@ -187,7 +188,6 @@ fn lamps_without_size_light_a_plate() {
         LightSource::Environment { color: Spectrum::ONE, image: None },
     ];
     let radiance = by_lamp + 0.7 * FRAC_1_PI * 2.0 * 0.8 + 0.7;
-    let settings = Settings { iterations: 16, samples: 64, ..Settings::default() };
     check("all lights", &plate(all), &settings, &[Integrator::Lt], radiance);
 }
 

@@ -156,13 +156,11 @@ impl<'a> Bidirectional<'a> {
             while let Some(light) = walk.filter(|light| light.depth < self.settings.max_depth) {
                 if !light.vertex.bsdf.is_delta() {
                     let stored = self.techniques.stored(&light);
-                    if self.keeps_vertices()
-                        && light.depth + more <= self.settings.max_depth
-                        && (stored == 1.0 || sampler.u1(light.depth, Purpose::Storing) < stored)
-                    {
+                    let kept = stored == 1.0 || sampler.u1(light.depth, Purpose::Storing) < stored;
+                    if kept && self.keeps_vertices() && light.depth + more <= self.settings.max_depth {
                         cache.push(&light);
                     }
-                    if let Some(film) = film.filter(|_| self.recipe.light_image)
+                    if let Some(film) = film.filter(|_| kept && self.recipe.light_image)
                         && let Some((raster, value, ray)) =
                             connect::connect_camera(world, &self.techniques, &light, &sampler)
                         && tally.connection(!world.visibility.occluded(&ray))
