@@ -9,6 +9,7 @@ use crate::sampler::Sampler;
 use crate::subpath::walk::{Rules, Walk};
 use crate::subpath::{Storing, Vertex, World, from_light};
 use glam::DVec3;
+use std::f64::consts::FRAC_1_PI;
 use std::ops::Deref;
 use std::sync::Arc;
 
@@ -71,7 +72,7 @@ impl Roulette {
     }
 }
 
-/// The roulette's lobes at a vertex: of reflection, and of transmission where light passes.
+/// The roulette's lobes at a vertex: of reflection, and of transmission where light passes, or of a diffuse base.
 #[derive(Debug, Clone, Copy)]
 pub struct Lobes {
     list: [Lobe; 2],
@@ -131,13 +132,18 @@ impl Techniques {
             let eta = if outside { eta } else { 1.0 / eta };
             Lobe::from_ggx_transmission(&frame, w_eye, alpha_x, alpha_y, eta, 1.0)
         });
-        for lobe in [Some(reflected), transmitted].into_iter().flatten() {
+        let axes = [Some(reflected), transmitted];
+        for lobe in axes.into_iter().flatten() {
             // Without a weight nothing would ever be kept, though there may be light beside the axis.
             let axis = lobe.frame().z;
             let weight = luminance(vertex.factor(w_eye, axis)) * vertex.cos_ng(axis);
             if weight > 0.0 {
                 lobes.push(lobe.with_weight(weight));
             }
+        }
+        if let Some(albedo) = vertex.bsdf.diffuse_base() {
+            // Half of the greatest value of f cos, the mean over the hemisphere.
+            lobes.push(Lobe::sphere(0.5 * FRAC_1_PI * luminance(albedo)));
         }
         lobes
     }

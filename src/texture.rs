@@ -47,6 +47,12 @@ impl Texture {
         above.lerp(below, y.weight)
     }
 
+    /// The value, where it is the same over the whole plane.
+    pub fn constant(&self) -> Option<Spectrum> {
+        let (low, high) = self.bounds();
+        (low == high).then_some(low)
+    }
+
     /// Least and greatest value of each channel over the whole plane.
     pub fn bounds(&self) -> (Spectrum, Spectrum) {
         let mut pixels = self.image.pixels.iter().map(|p| p.as_dvec3());

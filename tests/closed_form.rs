@@ -122,9 +122,16 @@ fn plates(mesh: &mut Mesh, materials: &mut Vec<Material>) -> f64 {
 fn a_lamp_over_a_plate_has_its_form_factor() {
     let (mut mesh, mut materials) = (Mesh::default(), Vec::new());
     let radiance = plates(&mut mesh, &mut materials);
-    let scene = small(in_memory(mesh, materials, DVec3::new(2.0, 0.6, 0.0), DVec3::ZERO, 0.2));
+    let mut scene = small(in_memory(mesh, materials, DVec3::new(2.0, 0.6, 0.0), DVec3::ZERO, 0.2));
     let settings = Settings { iterations: 64, samples: 16, ..Settings::default() };
     check("plates", &scene, &settings, &[Integrator::Lt], radiance);
+    // Half of a lamp gives half of the light; a veil that stops a third takes a third of it.
+    scene.materials[1].opacity = 0.5;
+    scene.materials.push(Material::diffuse("veil", Spectrum::ZERO));
+    scene.materials[2].opacity = 1.0 / 3.0;
+    quad(&mut scene.mesh, [[-1, 0, -1], [1, 0, -1], [1, 0, 1], [-1, 0, 1]], 1.5, Vec3::Y * 0.95, 2);
+    let settings = Settings { iterations: 64, samples: 64, ..Settings::default() };
+    check("half a lamp behind a veil", &scene, &settings, &[Integrator::Lt], radiance / 3.0);
 }
 
 /// The same plate, seen in a mirror that also throws the lamp's image on it: light by way of the mirror arrives as if
@@ -188,7 +195,10 @@ fn lamps_without_size_light_a_plate() {
         LightSource::Environment { color: Spectrum::ONE, image: None },
     ];
     let radiance = by_lamp + 0.7 * FRAC_1_PI * 2.0 * 0.8 + 0.7;
-    check("all lights", &plate(all), &settings, &[Integrator::Lt], radiance);
+    for integrator in [Integrator::Pt, Integrator::LvcHrr] {
+        let settings = Settings { integrator, iterations: 64, samples: 256, ..settings.clone() };
+        assert_radiance("all lights", &plate(all.clone()), &settings, radiance);
+    }
 }
 
 /// In a sky of radiance 1 a convex thing shows its albedo, and clear glass shows the sky.

@@ -2,6 +2,7 @@
 //! pool of their own: work is spread over the rayon pool that they are called in.
 
 pub mod recipe;
+pub mod plan;
 pub mod path;
 pub mod bidirectional;
 mod guiding;
@@ -9,6 +10,7 @@ mod merging;
 mod records;
 mod tile;
 
+pub use plan::Plan;
 pub use recipe::Recipe;
 
 use crate::error::Result;

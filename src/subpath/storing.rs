@@ -21,7 +21,7 @@ impl Storing {
 
     /// Whether a surface scatters narrowly.
     pub fn is_narrow(&self, bsdf: &Bsdf) -> bool {
-        bsdf.is_delta() || bsdf.glossy().is_some_and(|g| g.alpha_x.max(g.alpha_y) <= self.max_alpha)
+        bsdf.narrowest().is_some_and(|alpha| alpha <= self.max_alpha)
     }
 
     /// The probability of storing a vertex whose predecessor is narrow or not.

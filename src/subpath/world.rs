@@ -8,7 +8,7 @@ use crate::geometry::SurfacePoint;
 use crate::light::{LightPoint, Lights};
 use crate::scene::Scene;
 use crate::settings::Settings;
-use crate::visibility::{self, Ray, Visibility};
+use crate::visibility::{self, Cutouts, Ray, Visibility};
 use glam::{DVec2, DVec3};
 
 /// A scene with its emitters, camera and ray queries. Shared by all threads.
@@ -34,20 +34,27 @@ impl<'a> World<'a> {
             scene,
             lights: Lights::new(&scene.mesh, &scene.materials, &scene.lights),
             camera: Camera::new(&scene.camera, (scene.film.width, scene.film.height), scene.mesh.origin)?,
-            visibility: visibility::build(settings.visibility, &scene.mesh, settings.threads)?,
+            visibility: visibility::build_with_cutouts(
+                settings.visibility,
+                &scene.mesh,
+                Cutouts::new(&scene.mesh, &scene.materials),
+                settings.threads,
+            )?,
         })
     }
 
-    /// The scattering model of a triangle, but for its texture.
-    pub fn bsdf_of(&self, triangle: u32) -> Bsdf {
-        self.scene.materials[self.scene.mesh.materials[triangle as usize] as usize].bsdf(DVec2::ZERO)
+    /// The scattering model at a surface point.
+    pub fn bsdf_at(&self, point: &SurfacePoint) -> Bsdf {
+        let mesh = &self.scene.mesh;
+        let material = &self.scene.materials[mesh.materials[point.triangle as usize] as usize];
+        material.bsdf(if material.is_constant() { DVec2::ZERO } else { point.uv(mesh) })
     }
 
     /// Whether the surface of a light scatters narrowly. Light from a lamp without surface does not count as a caustic:
     /// next-event estimation finds it.
     pub fn is_narrow(&self, storing: &Storing, light: &LightPoint) -> bool {
         match light {
-            LightPoint::Surface(emitter) => storing.is_narrow(&self.bsdf_of(emitter.point.triangle)),
+            LightPoint::Surface(emitter) => storing.is_narrow(&self.bsdf_at(&emitter.point)),
             _ => false,
         }
     }

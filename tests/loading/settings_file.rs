@@ -116,11 +116,11 @@ fn wrong_keys_and_values_are_named() {
         ("[material.lmp]\nemission = 1", "s.toml:2: no MTL file has a material 'lmp'; did you mean 'lamp'?"),
         (
             "[material.lamp]\nalbedo = 1",
-            "s.toml:3: 'albedo' in [material.lamp] needs a type beside it: diffuse, conductor, dielectric, mirror",
+            "s.toml:3: 'albedo' in [material.lamp] needs a type beside it: diffuse, conductor, dielectric, mirror, coated",
         ),
         (
             "[material.lamp]\ntype = \"difuse\"",
-            "s.toml:3: material.lamp.type is \"difuse\"; it must be one of diffuse, conductor, dielectric, mirror; did you mean 'diffuse'?",
+            "s.toml:3: material.lamp.type is \"difuse\"; it must be one of diffuse, conductor, dielectric, mirror, coated; did you mean 'diffuse'?",
         ),
         (
             "[material.lamp]\ntype = \"diffuse\"\nalbdo = 1",
@@ -171,6 +171,7 @@ fn wrong_keys_and_values_are_named() {
             "[[light]]\ntype = \"sport\"",
             "s.toml:3: light.type is \"sport\"; it must be one of point, spot, directional, environment; did you mean 'spot'?",
         ),
+        ("[material.lamp]\nopacity = 1.5", "s.toml:3: material.lamp.opacity is 1.5; it must lie in 0..=1"),
         ("camera = { fov_y = 0 }", "s.toml:2: camera.fov_y is 0; it must lie between 0 and 180 degrees"),
     ] {
         let (text, code) = toml_error(&format!("{OBJ_LINE}{toml}\n"));
