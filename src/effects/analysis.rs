@@ -104,7 +104,7 @@ impl<'a> Facts<'a> {
                 // What is smooth shows no light without size: those paths carry nothing.
                 let seen = !delta_light || surfaces.iter().any(|v| *v != S);
                 let possible = surfaces.len() == 1 || mutual;
-                let short = surfaces.len() as u32 + 1 <= self.max_depth;
+                let short = (surfaces.len() as u32) < self.max_depth;
                 if there && seen && possible && short && surfaces.iter().all(exists) {
                     classes.push(PathClass { delta_light, surfaces: surfaces.to_vec(), effect });
                 }

@@ -17,7 +17,7 @@ pub struct Plan {
     pub machinery: Vec<&'static str>,
     /// Effects that the scene calls for and that were left out on demand: the image is biased.
     pub dropped: EffectSet,
-    /// Kinds of paths that nothing finds; with an algorithm that was asked for by name, the image is biased.
+    /// Kinds of paths, of effects that were left out, that nothing finds.
     pub uncovered: Vec<PathClass>,
 }
 
@@ -44,7 +44,7 @@ impl Plan {
 /// Plans a render: what the settings name, or for `auto` what the effects call for.
 ///
 /// # Errors
-/// [`Error::Unsupported`], naming the kind of path, when `auto` finds nothing that covers it.
+/// [`Error::Unsupported`], naming the kind of path, when nothing that runs finds it and its effect was not left out.
 pub fn plan(scene: &Scene, settings: &Settings, effects: &Effects) -> Result<Plan> {
     let on = |effect: Effect| {
         (effects.wants(effect) || settings.with.contains(effect)) && !settings.without.contains(effect)
@@ -68,13 +68,15 @@ pub fn plan(scene: &Scene, settings: &Settings, effects: &Effects) -> Result<Pla
     let dropped: EffectSet = settings.without.iter().filter(|&e| effects.wants(e)).collect();
     let uncovered: Vec<PathClass> =
         effects.classes.iter().filter(|class| !coverage(recipe.as_ref()).finds(class)).cloned().collect();
-    if !by_name
-        && dropped.is_empty()
-        && let Some(class) = uncovered.first()
-    {
+    let tolerated =
+        |class: &PathClass| settings.without.contains(class.effect) || !by_name && !light_subpaths;
+    if let Some(class) = uncovered.iter().find(|class| !tolerated(class)) {
         return Err(Error::Unsupported {
             place: Place::file(&scene.path),
-            message: format!("{class}: no technique of {integrator} finds such paths"),
+            message: format!(
+                "paths {class}: {integrator} does not find them; choose another integrator, or render without {}",
+                class.effect
+            ),
         });
     }
     let mut machinery: BTreeSet<&'static str> = machinery(recipe.as_ref()).into_iter().collect();
@@ -123,9 +125,14 @@ fn machinery(recipe: Option<&Recipe>) -> Vec<&'static str> {
 /// [`Error::Usage`] for an effect that cannot be left out.
 pub fn without(scene: &Scene, settings: &Settings) -> Result<Option<(Scene, Settings)>> {
     use crate::light::LightSource;
+    if settings.without.is_empty() {
+        return Ok(None);
+    }
     let (mut scene, mut settings) = (scene.clone(), settings.clone());
     for effect in settings.without.iter() {
         match effect {
+            // What an algorithm that was asked for by name does not find.
+            Effect::Direct | Effect::Specular if settings.integrator != Integrator::Auto => (),
             Effect::Interreflection => settings.max_depth = settings.max_depth.min(2),
             Effect::LightSubpaths | Effect::Caustics | Effect::Sdg | Effect::Sds => (),
             Effect::Environment => scene.lights.retain(|l| !matches!(l, LightSource::Environment { .. })),
@@ -152,5 +159,5 @@ pub fn without(scene: &Scene, settings: &Settings) -> Result<Option<(Scene, Sett
             }
         }
     }
-    Ok((!settings.without.is_empty()).then_some((scene, settings)))
+    Ok(Some((scene, settings)))
 }

@@ -2,18 +2,20 @@
 
 pub mod counters;
 pub mod observer;
+mod sizing;
 
 pub use counters::{Counters, Memory, Seconds, Stats};
 pub use observer::{Observer, Progress, Silent};
 
+use crate::effects;
 use crate::error::{Error, Result};
 use crate::film::Film;
-use crate::integrator;
+use crate::integrator::{self, Plan, Size};
 use crate::scene::Scene;
-use crate::settings::{Integrator, Settings};
+use crate::settings::Settings;
 use crate::subpath::World;
 use crate::tally::Tally;
-use std::collections::BTreeMap;
+use sizing::{Measured, Sizing};
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Instant;
 
@@ -24,6 +26,10 @@ pub struct Outcome {
     pub film: Film,
     /// What was done and what it cost. `seconds.load` and `seconds.total` are for the caller to fill in.
     pub stats: Stats,
+    /// Sizes that were chosen for iterations, with what each counts for; empty where the settings say them.
+    pub sizes: Vec<(Size, u32)>,
+    /// What was switched on, and what is missing from the image.
+    pub plan: Plan,
     /// Whether the observer ended it.
     pub interrupted: bool,
 }
@@ -42,14 +48,24 @@ pub fn render(scene: &Scene, settings: &Settings, observer: &dyn Observer) -> Re
 }
 
 fn run(scene: &Scene, settings: &Settings, observer: &dyn Observer) -> Result<Outcome> {
+    let effects = effects::analyze(scene, settings);
+    let plan = integrator::plan::plan(scene, settings, &effects)?;
+    if let Some(complaint) = plan.complaint() {
+        observer.warn(&complaint);
+    }
+    let reduced = integrator::plan::without(scene, settings)?;
+    let (scene, settings) = reduced.as_ref().map_or((scene, settings), |(scene, settings)| (scene, settings));
     let mut settings = settings.clone();
-    settings.integrator = chosen(scene, &settings);
+    settings.integrator = plan.integrator;
     let start = Instant::now();
     let world = World::new(scene, &settings)?;
     let accel_build = start.elapsed().as_secs_f64();
     if world.lights.is_empty() {
         observer.warn("nothing in the scene emits light: the image is black");
     }
+    let mut size = Size::of(&settings, &scene.film);
+    let sizing = Sizing::new(&settings, &scene.film);
+    let mut sizes: Vec<(Size, u32)> = sizing.iter().map(|_| (size, 1)).collect();
     let mut integrator = integrator::new(&world, &settings)?;
     let mut film = Film::new(&scene.film);
     let mut tally = Tally::default();
@@ -80,11 +96,20 @@ fn run(scene: &Scene, settings: &Settings, observer: &dyn Observer) -> Result<Ou
             });
         };
         progress(0.0);
-        tally.add(&integrator.iterate(settings.first_iteration + finished, &mut film, &progress)?);
+        let done = integrator.iterate(settings.first_iteration + finished, &mut film, &progress)?;
+        tally.add(&done);
         finished += 1;
         accepted.store(tally.roulette.accepted, Ordering::Relaxed);
         let (cache, tree) = integrator.bytes();
         bytes = (bytes.0.max(cache), bytes.1.max(tree));
+        if let Some(sizing) = &sizing {
+            let measured = Measured { size, tally: done, bytes: cache + tree };
+            let Some((next, weight)) = sizing.next(start.elapsed().as_secs_f64(), &measured) else { break };
+            size = next;
+            integrator.resize(size)?;
+            film.set_weight(weight);
+            sizes.push((size, weight));
+        }
     }
     let render = start.elapsed().as_secs_f64();
     if film.dropped() > 0 {
@@ -103,7 +128,11 @@ fn run(scene: &Scene, settings: &Settings, observer: &dyn Observer) -> Result<Ou
         width: film.width(),
         height: film.height(),
         iterations: finished,
-        effects: BTreeMap::new(),
+        effects: effects
+            .findings
+            .iter()
+            .map(|f| (f.effect.id().to_owned(), f.verdict.name().to_owned()))
+            .collect(),
         seconds: Seconds {
             load: 0.0,
             accel_build,
@@ -132,22 +161,6 @@ fn run(scene: &Scene, settings: &Settings, observer: &dyn Observer) -> Result<Ou
             vertex_bvh_bytes: bytes.1 as u64,
         },
     };
-    Ok(Outcome { film, stats, interrupted })
-}
-
-/// What `auto` stands for: the least machinery that finds all of the scene's light.
-fn chosen(scene: &Scene, settings: &Settings) -> Integrator {
-    use crate::bsdf::Bsdf;
-    if settings.integrator != Integrator::Auto {
-        return settings.integrator;
-    }
-    let bsdfs: Vec<Bsdf> = scene.materials.iter().map(|m| m.bsdf(glam::DVec2::ZERO)).collect();
-    let glossy = |b: &Bsdf| b.glossy().is_some_and(|g| g.alpha_x.max(g.alpha_y) <= settings.hrr_alpha);
-    if bsdfs.iter().any(glossy) {
-        Integrator::LvcHrr
-    } else if bsdfs.iter().any(|b| b.is_delta() || b.glossy().is_some()) {
-        Integrator::Lvc
-    } else {
-        Integrator::Pt
-    }
+    sizes.truncate(usize::try_from(finished).unwrap_or(usize::MAX));
+    Ok(Outcome { film, stats, sizes, plan, interrupted })
 }

@@ -78,7 +78,7 @@ pub(super) fn material(
         }
     }
     let uses_kd_map = scattering.albedo_map().is_some();
-    let unused = |k: &&str| !(uses_kd_map && *k == "map_Kd") && !FOLLOWED.contains(k);
+    let unused = |k: &&str| !(FOLLOWED.contains(k) || uses_kd_map && *k == "map_Kd");
     for key in m.maps().into_iter().filter(unused) {
         let message = format!("material '{}': {key} is not used yet", v.name);
         notes.add(key, &library.place(m, key), message);
