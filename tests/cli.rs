@@ -207,8 +207,8 @@ fn effects_are_told_as_the_contract_says() {
     assert!(code == 0 && out.starts_with("direct: wanted: ") && out.contains("first triangle"), "{out}");
     let (code, out, _) = place.run("effects scene.toml");
     assert!(code == 0 && out.starts_with("effect ") && out.contains("\nplan: "), "{out}");
-    let (code, _, err) = place.run("effects scene.toml --why sdq");
-    assert!(code == 2 && err.contains("did you mean 'sdg'?"), "{err}");
+    let (code, _, err) = place.run("effects scene.toml --why caustic");
+    assert!(code == 2 && err.contains("did you mean 'caustics'?"), "{err}");
     // What is left out is said in the image.
     let (code, _, err) = place.run("render scene.toml -o a.exr --without direct");
     assert!(code == 0 && err.contains("the image is biased"), "{err}");

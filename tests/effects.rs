@@ -197,6 +197,9 @@ fn paths_that_nothing_finds_are_an_error_that_names_them() {
     let without = |list: &str| Settings { without: list.parse().unwrap(), ..settings() };
     let plan = planned(&scene, &Settings { integrator: Integrator::Lvc, ..without("sds") }).unwrap();
     assert!(plan.is_biased() && plan.complaint().unwrap().contains("L S D S E"), "{plan:?}");
+    // Light tracing without all that is smooth.
+    let plan = planned(&scene, &Settings { integrator: Integrator::Lt, ..without("specular") }).unwrap();
+    assert!(plan.is_biased() && plan.complaint().unwrap().contains("L D S E"), "{plan:?}");
     // Auto does without what it is told to.
     let plan = planned(&scene, &without("sds")).unwrap();
     assert_eq!((plan.integrator, plan.is_biased()), (Integrator::Lvc, true));

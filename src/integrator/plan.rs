@@ -1,7 +1,7 @@
 //! `auto`: the least machinery that covers what a scene calls for.
 
 use super::recipe::{Base, Recipe};
-use crate::effects::paths::Coverage;
+use crate::effects::paths::{Coverage, Vertex};
 use crate::effects::{Effect, EffectSet, Effects, PathClass, Verdict};
 use crate::error::{Error, Place, Result};
 use crate::scene::Scene;
@@ -68,8 +68,11 @@ pub fn plan(scene: &Scene, settings: &Settings, effects: &Effects) -> Result<Pla
     let dropped: EffectSet = settings.without.iter().filter(|&e| effects.wants(e)).collect();
     let uncovered: Vec<PathClass> =
         effects.classes.iter().filter(|class| !coverage(recipe.as_ref()).finds(class)).cloned().collect();
-    let tolerated =
-        |class: &PathClass| settings.without.contains(class.effect) || !by_name && !light_subpaths;
+    let left_out = |effect: Effect| settings.without.contains(effect);
+    let tolerated = |class: &PathClass| {
+        let smooth = class.surfaces.contains(&Vertex::S);
+        left_out(class.effect) || left_out(Effect::Specular) && smooth || !by_name && !light_subpaths
+    };
     if let Some(class) = uncovered.iter().find(|class| !tolerated(class)) {
         return Err(Error::Unsupported {
             place: Place::file(&scene.path),
