@@ -4,10 +4,10 @@ use crate::bsdf::Transport;
 use crate::light::LightPoint;
 use crate::light::point::Toward;
 use crate::math::Spectrum;
-use crate::mis::per_area;
+use crate::mis::{Side, per_area};
 use crate::sampler::{Purpose, Sampler};
-use crate::subpath::World;
 use crate::subpath::walk::{Rules, Segment, Start, Walk};
+use crate::subpath::{Origin, Total, World};
 use crate::techniques::{Lobes, Merging, Techniques};
 use crate::visibility::{Ray, offset};
 use glam::{DVec2, DVec3};
@@ -19,9 +19,8 @@ pub struct EyeVertex {
     pub walk: Walk,
     /// The roulette's lobes here; empty where it is off.
     pub lobes: Lobes,
-    /// m of the edge to the previous eye vertex or the camera, were this vertex the light subpath's last; over the
-    /// probability of storing it.
-    m_previous: f64,
+    /// m of the edge to the previous eye vertex or the camera, were this vertex the light subpath's last.
+    m_previous: Total,
     /// m of that edge, were this vertex on an emitter.
     m_emitter: f64,
 }
@@ -56,7 +55,7 @@ impl EyeVertex {
             direction,
             pdf_w: world.camera.pdf_w(direction),
             cos: 1.0,
-            total: [0.0; 2],
+            total: Total::known(0.0),
             distant: false,
         };
         let Some(point) = world.intersect(&start.ray, origin, direction) else {
@@ -64,16 +63,17 @@ impl EyeVertex {
             return world.lights.sky(direction).map_or(Onward::End, |sky| Onward::Sky(sky.radiance));
         };
         let rules = techniques.rules(Transport::Radiance);
+        let seen = Total { seen: techniques.light_image, ..Total::default() };
         match Walk::arrive(world, &rules, &start, Spectrum::ONE, point) {
-            Some(walk) => Onward::Vertex(Self::new(techniques, walk, techniques.light_image, 0.0)),
+            Some(walk) => Onward::Vertex(Self::new(techniques, walk, seen, 0.0)),
             None => Onward::End,
         }
     }
 
-    fn new(techniques: &Techniques, walk: Walk, m_previous: f64, m_emitter: f64) -> Self {
+    fn new(techniques: &Techniques, walk: Walk, m_previous: Total, m_emitter: f64) -> Self {
         let delta = walk.vertex.bsdf.is_delta();
         let lobes = if delta { Lobes::NONE } else { techniques.lobes(&walk.vertex, walk.vertex.wo) };
-        Self { walk, lobes, m_previous: if delta { 0.0 } else { m_previous }, m_emitter }
+        Self { walk, lobes, m_previous: if delta { Total::default() } else { m_previous }, m_emitter }
     }
 
     /// Goes on from this vertex.
@@ -81,7 +81,7 @@ impl EyeVertex {
         let rules = techniques.rules(Transport::Radiance);
         let segment = self.walk.scatter(&rules, sampler, |s| {
             if s.delta {
-                return [techniques.heuristic.total(&self.walk.side, 0.0, s.pdf_rev, 0.0), 0.0];
+                return Total::known(techniques.heuristic.total(&self.walk.side, 0.0, s.pdf_rev, 0.0));
             }
             self.totals(techniques, s.pdf_rev)
         });
@@ -92,7 +92,7 @@ impl EyeVertex {
         };
         let Some(walk) = self.walk.go_on(world, &rules, &segment, point) else { return Onward::End };
         if walk.after_delta {
-            return Onward::Vertex(Self::new(techniques, walk, 0.0, 0.0));
+            return Onward::Vertex(Self::new(techniques, walk, Total::default(), 0.0));
         }
         let m = techniques.connection(&self.lobes, -walk.to_previous());
         Onward::Vertex(Self::new(techniques, walk, m, techniques.next_event))
@@ -107,7 +107,7 @@ impl EyeVertex {
         if m_0 == 0.0 {
             return Onward::End;
         }
-        let total = start.total(rules, world.is_narrow(&rules.storing, &light));
+        let total = start.total.given(rules.heuristic, &rules.storing, Origin::Lamp);
         let side = rules.heuristic.arrive(start.pdf_w, 1.0, start.cos, 1.0, total);
         let m_next_event = if segment.delta { 0.0 } else { techniques.next_event };
         let back = techniques.emission_pdf(world, &light, sky.direction, start.origin);
@@ -116,28 +116,31 @@ impl EyeVertex {
     }
 
     /// E_s of a technique whose light side ends with an edge along `w_light`; `density`: in which the light side would
-    /// choose this vertex; `stored`: with what probability it would be stored after that.
-    fn others(&self, techniques: &Techniques, density: f64, w_light: DVec3, stored: f64) -> f64 {
-        techniques.heuristic.others(density, self.total(techniques, w_light, stored))
+    /// choose this vertex; `origin`: what the light side ends with.
+    fn others(&self, techniques: &Techniques, density: f64, w_light: DVec3, origin: Origin) -> f64 {
+        techniques.heuristic.others(density, self.total(techniques, w_light, origin))
     }
 
     /// The sum over the eye side's techniques up to this vertex, when the path goes on along `w_light`.
-    fn total(&self, techniques: &Techniques, w_light: DVec3, stored: f64) -> f64 {
+    fn total(&self, techniques: &Techniques, w_light: DVec3, origin: Origin) -> f64 {
         let back = self.walk.vertex.pdf_w(w_light, self.walk.vertex.wo);
-        let [known, if_stored] = self.totals(techniques, back);
-        known + techniques.heuristic.raise(stored) * if_stored
+        self.totals(techniques, back).given(techniques.heuristic, &techniques.storing, origin)
     }
 
-    /// The sum over the eye side's techniques up to this vertex: of those that do not need it stored as a light vertex,
-    /// and, over the probability of that, of those that do. `back`: density of scattering to the previous vertex, 1/sr.
-    fn totals(&self, techniques: &Techniques, back: f64) -> [f64; 2] {
-        let (heuristic, side) = (techniques.heuristic, &self.walk.side);
-        [heuristic.total(side, 0.0, back, 0.0), heuristic.total(side, self.m_previous, 0.0, techniques.eta())]
+    /// The sum over the eye side's techniques up to this vertex. `back`: density of scattering to the previous vertex,
+    /// 1/sr.
+    fn totals(&self, techniques: &Techniques, back: f64) -> Total {
+        let (heuristic, side, m) = (techniques.heuristic, &self.walk.side, &self.m_previous);
+        Total {
+            known: heuristic.total(side, m.known, back, 0.0),
+            stored: heuristic.total(side, m.stored, 0.0, techniques.eta()),
+            seen: heuristic.total(side, m.seen, 0.0, 0.0),
+        }
     }
 
     /// Radiance that this vertex emits itself, by technique s = 0.
     pub fn emitted(&self, world: &World<'_>, techniques: &Techniques) -> Spectrum {
-        let Walk { vertex, throughput, side, .. } = &self.walk;
+        let Walk { vertex, throughput, .. } = &self.walk;
         let Some(emitter) = world.lights.at(&vertex.point) else { return Spectrum::ZERO };
         let radiance = emitter.radiance(vertex.wo);
         if radiance == Spectrum::ZERO || techniques.eye_hits == 0.0 && self.walk.depth > 1 {
@@ -146,10 +149,10 @@ impl EyeVertex {
         if self.walk.depth == 1 {
             return *throughput * radiance; // no other technique sees emitters directly
         }
-        let heuristic = techniques.heuristic;
+        let (heuristic, side) = (techniques.heuristic, Side { b: self.walk.b_as_lamp, ..self.walk.side });
         let first = vertex.point.position + self.walk.to_previous();
         let back = techniques.emission_pdf(world, &LightPoint::Surface(emitter), vertex.wo, first);
-        let e = heuristic.others(emitter.pdf_a, heuristic.total(side, self.m_emitter, back, 0.0));
+        let e = heuristic.others(emitter.pdf_a, heuristic.total(&side, self.m_emitter, back, 0.0));
         *throughput * radiance * heuristic.weight(0.0, techniques.eye_hits, e)
     }
 
@@ -176,9 +179,8 @@ impl EyeVertex {
         let (heuristic, m) = (techniques.heuristic, techniques.next_event);
         let l = per_area(pdf_w, cos_light, distance2) * techniques.eye_hits(&light) / light.pdf();
         let emission = techniques.emission_pdf(world, &light, -w, vertex.point.position);
-        let stored = techniques.storing.probability(world.is_narrow(&techniques.storing, &light));
         let density = per_area(emission, vertex.cos_ng(w), distance2);
-        let e = self.others(techniques, density, w, stored);
+        let e = self.others(techniques, density, w, Origin::Lamp);
         let value = value * (heuristic.weight(heuristic.raise(l), m, e) / light.pdf());
         Some((value, offset::to_light(&vertex.point, &light)))
     }
@@ -208,8 +210,7 @@ impl EyeVertex {
         let heuristic = techniques.heuristic;
         let l = techniques.light_others(light, per_area(pdf_w, cos_light, edge.distance2), -edge.w);
         let density = per_area(y.pdf_w(y.wo, -edge.w), cos, edge.distance2);
-        let stored = techniques.storing.probability(techniques.storing.is_narrow(&y.bsdf));
-        let e = self.others(techniques, density, edge.w, stored);
+        let e = self.others(techniques, density, edge.w, techniques.storing.origin(&y.bsdf));
         let value = value * (heuristic.weight(l, m, e) / tries);
         Some((value, offset::between(&eye.point, &y.point)))
     }
@@ -224,21 +225,23 @@ impl EyeVertex {
         let stored = techniques.stored(light);
         let eta = merging.eta() * stored;
         let light_total = techniques.light_total(light, vertex.wo);
-        let eye_total = self.total(techniques, light.vertex.wo, stored);
+        let eye_total = self.total(techniques, light.vertex.wo, light.origins[0]);
         value * (techniques.heuristic.merging_weight(light_total, eta, eye_total) / eta)
     }
 }
 
 /// Technique s = k-1: a light vertex seen by the camera. The value, for the sum over a film's eye samples, belongs at
-/// the raster position if the ray is free. For light vertices that are stored, with the probability of that. `sampler`
-/// gives the point of the lens.
+/// the raster position if the ray is free. `sampler` gives the point of the lens.
 pub fn connect_camera(
     world: &World<'_>,
     techniques: &Techniques,
     light: &Walk,
     sampler: &Sampler,
 ) -> Option<(DVec2, Spectrum, Ray)> {
-    let y = &light.vertex;
+    let (y, m) = (&light.vertex, techniques.light_image * techniques.seen(light));
+    if m == 0.0 {
+        return None;
+    }
     let lens = world.camera.lens_point(|| sampler.u2(light.depth, Purpose::Lens));
     let edge = Edge::new(lens, y.point.position)?;
     let raster = world.camera.raster_from(lens, edge.w)?;
@@ -248,7 +251,6 @@ pub fn connect_camera(
         return None;
     }
     let l = techniques.light_others(light, pdf, -edge.w);
-    let m = techniques.light_image * techniques.stored(light);
     let ray = offset::free_to_surface(lens, &y.point);
     Some((raster, value * (techniques.heuristic.weight(l, m, 0.0) / m), ray))
 }

@@ -14,7 +14,7 @@ use hrr::sampler::{Purpose, Sampler, Stream};
 use hrr::scene::Scene;
 use hrr::settings::{Backend, Settings};
 use hrr::subpath::walk::Start;
-use hrr::subpath::{Storing, Vertex, Walk, World};
+use hrr::subpath::{Origin, Role, Storing, Total, Vertex, Walk, World};
 use hrr::techniques::{Merging, Roulette, Techniques};
 use hrr::visibility::offset;
 use std::sync::Arc;
@@ -28,7 +28,7 @@ const TECHNIQUES: Techniques = Techniques {
     base: 1.7,
     roulette: Some(Roulette { light_subpaths: 1400.0, constant: 0.02, max_alpha: 0.3 }),
     merging: Some(Merging { light_subpaths: 1400.0, radius: 0.01 }),
-    storing: Storing { share: 0.3, max_alpha: 0.22 },
+    storing: Storing { share: 0.3, max_alpha: 0.22, lamps_seen: false },
     guide: None,
 };
 
@@ -104,14 +104,14 @@ impl Path {
             }
             self.pdf_w(i + 1, i + 2, i) * self.g(i + 1, i)
         };
-        // The probability of storing vertex i: what threw light on it decides.
-        let stored = |i: usize| {
-            let bsdf = match &self.light {
-                LightPoint::Surface(emitter) if i == 1 => world.bsdf_at(&emitter.point),
-                _ if i == 1 => return t.storing.share,
-                _ => self.surfaces[i - 2].bsdf,
-            };
-            if t.storing.is_narrow(&bsdf) { 1.0 } else { t.storing.share }
+        // The probability of vertex i's role: what threw light on it decides.
+        let has = |role: Role, i: usize| {
+            let origin = if i == 1 { Origin::Lamp } else { t.storing.origin(&self.surfaces[i - 2].bsdf) };
+            match (role, origin) {
+                (Role::Stored, Origin::Lamp | Origin::Broad) => t.storing.share,
+                (Role::Seen, Origin::Lamp) if !t.storing.lamps_seen => 0.0,
+                _ => 1.0,
+            }
         };
         let m = |s: usize| {
             if s == 0 {
@@ -124,16 +124,18 @@ impl Path {
                 return t.next_event;
             }
             if s == k - 1 {
-                return t.light_image * stored(s - 1);
+                return t.light_image * has(Role::Seen, s - 1);
             }
             let lobes = t.lobes(&self.surfaces[s - 1], self.to(s, s + 1));
             let offset = self.position(s - 1) - self.position(s);
-            t.connection(&lobes, offset) * stored(s - 1)
+            let m = t.connection(&lobes, offset);
+            m.known + m.stored * has(Role::Stored, s - 1)
         };
         let b = |s: usize| (0..s).map(fw).product::<f64>() * (s..k - 1).map(rv).product::<f64>();
         let eta = t.merging.map_or(0.0, |m| m.light_subpaths * std::f64::consts::PI * m.radius * m.radius);
-        let merging =
-            |i: usize| if i == 0 || i > k - 2 || delta(i) { 0.0 } else { stored(i) * eta * b(i) * fw(i) };
+        let merging = |i: usize| {
+            if i == 0 || i > k - 2 || delta(i) { 0.0 } else { has(Role::Stored, i) * eta * b(i) * fw(i) }
+        };
         [(0..k).map(|s| m(s) * b(s)).collect(), (0..k).map(merging).collect()]
     }
 
@@ -191,13 +193,13 @@ fn led_to(world: &World<'_>, t: &Techniques, light: &Walk, end: &Vertex) -> Opti
         direction,
         pdf_w,
         cos: y.cos_ng(direction),
-        total: [t.light_total(light, direction), 0.0],
+        total: Total::known(t.light_total(light, direction)),
         distant: false,
     };
     let throughput = light.throughput * y.factor(direction, y.wo) * (start.cos / pdf_w);
     let walk = Walk {
         depth: light.depth + 1,
-        after_narrow: [t.storing.is_narrow(&y.bsdf), light.after_narrow[0]],
+        origins: [t.storing.origin(&y.bsdf), light.origins[0]],
         ..Walk::follow(world, &t.rules(Transport::Importance), &start, throughput)?
     };
     let there = (walk.vertex.point.position - end.point.position).length() < 1e-9;
@@ -246,7 +248,10 @@ fn check_guided(scene: &Scene, heuristic: Heuristic) {
     let guide = EmissionGuide::learn(&world.lights, observations).map(Arc::new);
     assert!(guide.is_some());
     for guide in [None, guide] {
-        check(&world, &Techniques { heuristic, guide, ..TECHNIQUES });
+        for lamps_seen in [false, true] {
+            let storing = Storing { lamps_seen, ..TECHNIQUES.storing };
+            check(&world, &Techniques { heuristic, guide: guide.clone(), storing, ..TECHNIQUES });
+        }
     }
 }
 
@@ -328,7 +333,8 @@ fn check(world: &World<'_>, t: &Techniques) {
             let path = path(start, &lights, &eyes);
             let s = lights.len() + 1;
             let offset = light.vertex.point.position - eye.walk.vertex.point.position;
-            let m = t.connection(&eye.lobes, offset) * t.stored(light);
+            let m = t.connection(&eye.lobes, offset);
+            let m = m.known + m.stored * t.stored(light);
             if let Some((value, _)) = eye.connect(t, light, m, 1.0) {
                 let (y, z) = (&light.vertex, &eye.walk.vertex);
                 let w = offset.normalize();
@@ -368,7 +374,7 @@ fn check(world: &World<'_>, t: &Techniques) {
             let w = path.to(k - 2, k - 1);
             let plain =
                 light.throughput * y.factor(w, y.wo) * (path.g(k - 1, k - 2) * world.camera.pdf_w(-w));
-            let tries = t.light_image * t.stored(light);
+            let tries = t.light_image * t.seen(light);
             close("s = k-1", value.x / plain.x * tries, path.weight(world, t, 0, k - 1));
             count(3, &path);
         }

@@ -1,7 +1,7 @@
 //! Light subpaths.
 
-use super::World;
 use super::walk::{Rules, Start, Walk};
+use super::{Total, World};
 use crate::light::{EmissionGuide, LightPoint};
 use crate::sampler::{Purpose, Sampler};
 use crate::visibility::offset;
@@ -38,12 +38,11 @@ pub fn emit(
         direction: emission.direction,
         pdf_w: pdf,
         cos: emission.cos,
-        total: [rules.heuristic.raise(m_0 / light.pdf()), 0.0],
+        total: Total::known(rules.heuristic.raise(m_0 / light.pdf())),
         distant: matches!(light, LightPoint::Distant(_)),
     };
     let throughput = emission.radiance * (emission.cos / (light.pdf() * pdf));
-    let narrow = world.is_narrow(&rules.storing, &light);
-    Some(Walk { after_narrow: [narrow, false], ..Walk::follow(world, rules, &start, throughput)? })
+    Walk::follow(world, rules, &start, throughput)
 }
 
 /// The light that a subpath starts from, and the point of the unit square that stands for the way it takes; `None`

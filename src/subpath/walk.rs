@@ -1,6 +1,6 @@
 //! One step of a subpath, the same from either end.
 
-use super::{Scattered, Storing, Vertex, World};
+use super::{Origin, Scattered, Storing, Total, Vertex, World};
 use crate::bsdf::Transport;
 use crate::geometry::SurfacePoint;
 use crate::math::Spectrum;
@@ -19,14 +19,16 @@ pub struct Walk {
     pub throughput: Spectrum,
     /// Multiple importance sampling's sums.
     pub side: Side,
+    /// The `b` of these if the vertex is taken for the light's own, and not for a surface that is lit.
+    pub b_as_lamp: f64,
     /// Distance to the previous vertex, world units.
     pub distance: f64,
     /// Segments from the subpath's start, at least 1.
     pub depth: u32,
     /// Whether the previous vertex scattered by a delta lobe, so that nothing can connect to it.
     pub after_delta: bool,
-    /// Whether the previous vertex scatters narrowly ([`Storing`]), and the one before it.
-    pub after_narrow: [bool; 2],
+    /// Light side: what threw light on the vertex, and on the one before it.
+    pub origins: [Origin; 2],
 }
 
 /// What all steps of a subpath have in common.
@@ -53,9 +55,8 @@ pub struct Start {
     pub pdf_w: f64,
     /// |cos| at the origin.
     pub cos: f64,
-    /// [`Heuristic::total`] at the origin: what is known, and what counts for the probability that the origin would be
-    /// stored as a light vertex, were the vertex that the segment leads to its predecessor.
-    pub total: [f64; 2],
+    /// [`Heuristic::total`] at the origin.
+    pub total: Total,
     /// Whether the segment comes in from a distant light: `pdf_w` is then a density per area across it, 1/m^2.
     pub distant: bool,
 }
@@ -69,17 +70,6 @@ pub struct Segment {
     pub throughput: Spectrum,
     /// Whether its direction comes from a delta lobe.
     pub delta: bool,
-}
-
-impl Start {
-    /// [`Heuristic::total`] at the origin, once it is known whether what the segment leads to scatters narrowly.
-    pub fn total(&self, rules: &Rules, narrow: bool) -> f64 {
-        let [known, if_stored] = self.total;
-        if if_stored == 0.0 {
-            return known;
-        }
-        known + rules.heuristic.raise(rules.storing.probability(narrow)) * if_stored
-    }
 }
 
 impl Walk {
@@ -104,16 +94,24 @@ impl Walk {
             return None;
         }
         let vertex = Vertex::new(world, point, wo);
-        let total = start.total(rules, rules.storing.is_narrow(&vertex.bsdf));
+        let Rules { heuristic, storing, .. } = rules;
+        let total = start.total.given(*heuristic, storing, storing.origin(&vertex.bsdf));
         let spread = if start.distant { 1.0 } else { distance2 };
+        let side = heuristic.arrive(start.pdf_w, cos, start.cos, spread, total);
+        let as_lamp = start.total.given(*heuristic, storing, Origin::Lamp);
         Some(Self {
             vertex,
             throughput,
-            side: rules.heuristic.arrive(start.pdf_w, cos, start.cos, spread, total),
+            side,
+            b_as_lamp: if as_lamp == total {
+                side.b
+            } else {
+                heuristic.arrive(start.pdf_w, cos, start.cos, spread, as_lamp).b
+            },
             distance: distance2.sqrt(),
             depth: 1,
             after_delta: false,
-            after_narrow: [false; 2],
+            origins: [Origin::Lamp; 2],
         })
     }
 
@@ -122,7 +120,7 @@ impl Walk {
         &self,
         rules: &Rules,
         sampler: &Sampler,
-        total: impl FnOnce(&Scattered) -> [f64; 2],
+        total: impl FnOnce(&Scattered) -> Total,
     ) -> Option<Segment> {
         let s = self.vertex.sample(rules.transport, sampler, self.depth)?;
         let start = Start {
@@ -148,7 +146,7 @@ impl Walk {
         Some(Self {
             depth: self.depth + 1,
             after_delta: segment.delta,
-            after_narrow: [rules.storing.is_narrow(&self.vertex.bsdf), self.after_narrow[0]],
+            origins: [rules.storing.origin(&self.vertex.bsdf), self.origins[0]],
             ..Self::arrive(world, rules, &segment.start, segment.throughput, point)?
         })
     }
@@ -159,7 +157,7 @@ impl Walk {
         world: &World<'_>,
         rules: &Rules,
         sampler: &Sampler,
-        total: impl FnOnce(&Scattered) -> [f64; 2],
+        total: impl FnOnce(&Scattered) -> Total,
     ) -> Option<Self> {
         let segment = self.scatter(rules, sampler, total)?;
         let Start { ray, origin, direction, .. } = &segment.start;

@@ -1,11 +1,10 @@
 //! A scene made ready for rays.
 
-use super::Storing;
 use crate::bsdf::Bsdf;
 use crate::camera::Camera;
 use crate::error::Result;
 use crate::geometry::SurfacePoint;
-use crate::light::{LightPoint, Lights};
+use crate::light::Lights;
 use crate::scene::Scene;
 use crate::settings::Settings;
 use crate::visibility::{self, Cutouts, Ray, Visibility};
@@ -48,15 +47,6 @@ impl<'a> World<'a> {
         let mesh = &self.scene.mesh;
         let material = &self.scene.materials[mesh.materials[point.triangle as usize] as usize];
         material.bsdf(if material.is_constant() { DVec2::ZERO } else { point.uv(mesh) })
-    }
-
-    /// Whether the surface of a light scatters narrowly. Light from a lamp without surface does not count as a caustic:
-    /// next-event estimation finds it.
-    pub fn is_narrow(&self, storing: &Storing, light: &LightPoint) -> bool {
-        match light {
-            LightPoint::Surface(emitter) => storing.is_narrow(&self.bsdf_at(&emitter.point)),
-            _ => false,
-        }
     }
 
     /// The surface point that a ray meets first. `origin` and unit `direction` are the ray in full precision, before
