@@ -1,10 +1,12 @@
 //! Connections: what a path is worth whose two halves are joined by an edge, each technique's share included.
 
 use crate::bsdf::Transport;
+use crate::light::LightPoint;
+use crate::light::point::Toward;
 use crate::math::Spectrum;
 use crate::mis::{Side, per_area};
 use crate::sampler::{Purpose, Sampler};
-use crate::subpath::walk::{Start, Walk};
+use crate::subpath::walk::{Rules, Segment, Start, Walk};
 use crate::subpath::{Origin, Total, World};
 use crate::techniques::{Lobes, Merging, Techniques};
 use crate::visibility::{Ray, offset};
@@ -23,11 +25,30 @@ pub struct EyeVertex {
     m_emitter: f64,
 }
 
+/// Where an eye subpath goes on to.
+#[derive(Debug, Clone, Copy)]
+#[allow(clippy::large_enum_variant, reason = "it lives for one step, on the stack")]
+pub enum Onward {
+    /// To a surface.
+    Vertex(EyeVertex),
+    /// Out of the scene: what it finds there, by technique s = 0.
+    Sky(Spectrum),
+    /// Nowhere.
+    End,
+}
+
+impl Onward {
+    /// The vertex, where there is one.
+    pub fn vertex(self) -> Option<EyeVertex> {
+        if let Self::Vertex(vertex) = self { Some(vertex) } else { None }
+    }
+}
+
 impl EyeVertex {
-    /// The first vertex behind a raster position.
-    pub fn first(world: &World<'_>, techniques: &Techniques, raster: DVec2) -> Option<Self> {
-        let direction = world.camera.direction(raster);
-        let origin = world.camera.position;
+    /// What is behind a raster position; `sampler` gives the point of the lens.
+    pub fn first(world: &World<'_>, techniques: &Techniques, raster: DVec2, sampler: &Sampler) -> Onward {
+        let origin = world.camera.lens_point(|| sampler.u2(0, Purpose::Lens));
+        let direction = world.camera.direction_from(origin, raster);
         let start = Start {
             ray: offset::from_free_point(origin, direction),
             origin,
@@ -35,10 +56,18 @@ impl EyeVertex {
             pdf_w: world.camera.pdf_w(direction),
             cos: 1.0,
             total: Total::known(0.0),
+            distant: false,
         };
-        let walk = Walk::follow(world, &techniques.rules(Transport::Radiance), &start, Spectrum::ONE)?;
-        let seen = techniques.light_image;
-        Some(Self::new(techniques, walk, Total { seen, ..Total::default() }, 0.0))
+        let Some(point) = world.intersect(&start.ray, origin, direction) else {
+            // No other technique sees the sky directly.
+            return world.lights.sky(direction).map_or(Onward::End, |sky| Onward::Sky(sky.radiance));
+        };
+        let rules = techniques.rules(Transport::Radiance);
+        let seen = Total { seen: techniques.light_image, ..Total::default() };
+        match Walk::arrive(world, &rules, &start, Spectrum::ONE, point) {
+            Some(walk) => Onward::Vertex(Self::new(techniques, walk, seen, 0.0)),
+            None => Onward::End,
+        }
     }
 
     fn new(techniques: &Techniques, walk: Walk, m_previous: Total, m_emitter: f64) -> Self {
@@ -47,19 +76,43 @@ impl EyeVertex {
         Self { walk, lobes, m_previous: if delta { Total::default() } else { m_previous }, m_emitter }
     }
 
-    /// Goes on to the next eye vertex.
-    pub fn next(&self, world: &World<'_>, techniques: &Techniques, sampler: &Sampler) -> Option<Self> {
-        let walk = self.walk.next(world, &techniques.rules(Transport::Radiance), sampler, |s| {
+    /// Goes on from this vertex.
+    pub fn next(&self, world: &World<'_>, techniques: &Techniques, sampler: &Sampler) -> Onward {
+        let rules = techniques.rules(Transport::Radiance);
+        let segment = self.walk.scatter(&rules, sampler, |s| {
             if s.delta {
                 return Total::known(techniques.heuristic.total(&self.walk.side, 0.0, s.pdf_rev, 0.0));
             }
             self.totals(techniques, s.pdf_rev)
-        })?;
+        });
+        let Some(segment) = segment else { return Onward::End };
+        let Start { ray, origin, direction, .. } = &segment.start;
+        let Some(point) = world.intersect(ray, *origin, *direction) else {
+            return self.sky(world, techniques, &rules, &segment);
+        };
+        let Some(walk) = self.walk.go_on(world, &rules, &segment, point) else { return Onward::End };
         if walk.after_delta {
-            return Some(Self::new(techniques, walk, Total::default(), 0.0));
+            return Onward::Vertex(Self::new(techniques, walk, Total::default(), 0.0));
         }
         let m = techniques.connection(&self.lobes, -walk.to_previous());
-        Some(Self::new(techniques, walk, m, techniques.next_event))
+        Onward::Vertex(Self::new(techniques, walk, m, techniques.next_event))
+    }
+
+    /// What a segment that leaves the scene finds.
+    fn sky(&self, world: &World<'_>, techniques: &Techniques, rules: &Rules, segment: &Segment) -> Onward {
+        let start = &segment.start;
+        let Some(sky) = world.lights.sky(start.direction) else { return Onward::End };
+        let light = LightPoint::Distant(sky);
+        let m_0 = techniques.eye_hits(&light);
+        if m_0 == 0.0 {
+            return Onward::End;
+        }
+        let total = start.total.given(rules.heuristic, &rules.storing, Origin::Lamp);
+        let side = rules.heuristic.arrive(start.pdf_w, 1.0, start.cos, 1.0, total);
+        let m_next_event = if segment.delta { 0.0 } else { techniques.next_event };
+        let back = techniques.emission_pdf(world, &light, sky.direction, start.origin);
+        let e = rules.heuristic.others(sky.pdf, rules.heuristic.total(&side, m_next_event, back, 0.0));
+        Onward::Sky(segment.throughput * sky.radiance * rules.heuristic.weight(0.0, m_0, e))
     }
 
     /// E_s of a technique whose light side ends with an edge along `w_light`; `density`: in which the light side would
@@ -97,13 +150,13 @@ impl EyeVertex {
             return *throughput * radiance; // no other technique sees emitters directly
         }
         let (heuristic, side) = (techniques.heuristic, Side { b: self.walk.b_as_lamp, ..self.walk.side });
-        let total =
-            heuristic.total(&side, self.m_emitter, techniques.emission_pdf_w(&emitter, vertex.wo), 0.0);
-        let e = heuristic.others(emitter.pdf_a, total);
+        let first = vertex.point.position + self.walk.to_previous();
+        let back = techniques.emission_pdf(world, &LightPoint::Surface(emitter), vertex.wo, first);
+        let e = heuristic.others(emitter.pdf_a, heuristic.total(&side, self.m_emitter, back, 0.0));
         *throughput * radiance * heuristic.weight(0.0, techniques.eye_hits, e)
     }
 
-    /// Technique s = 1: light straight from a point of an emitter. The value counts if the ray is free.
+    /// Technique s = 1: light straight from a point of a light. The value counts if the ray is free.
     pub fn next_event(
         &self,
         world: &World<'_>,
@@ -111,26 +164,25 @@ impl EyeVertex {
         sampler: &Sampler,
     ) -> Option<(Spectrum, Ray)> {
         let (depth, vertex) = (self.walk.depth, &self.walk.vertex);
-        let emitter = world
+        let light = world
             .lights
-            .sample_point(sampler.u1(depth, Purpose::LightPick), sampler.u2(depth, Purpose::LightPoint))?;
-        let edge = Edge::new(vertex.point.position, emitter.point.position)?;
-        let radiance = emitter.radiance(-edge.w);
+            .sample(sampler.u1(depth, Purpose::LightPick), sampler.u2(depth, Purpose::LightPoint))?;
+        let Toward { w, distance2, cos: cos_light, radiance } = light.toward(vertex.point.position)?;
         if radiance == Spectrum::ZERO {
             return None;
         }
-        let (cos, cos_light) = (vertex.cos_ng(edge.w), emitter.point.ng.dot(edge.w).abs());
-        let (factor, pdf_w) = vertex.toward_light(edge.w);
-        let value = self.walk.throughput * factor * radiance * (cos_light / edge.distance2);
+        let (factor, pdf_w) = vertex.toward_light(w);
+        let value = self.walk.throughput * factor * radiance * (cos_light / distance2);
         if value == Spectrum::ZERO {
             return None;
         }
         let (heuristic, m) = (techniques.heuristic, techniques.next_event);
-        let l = per_area(pdf_w, cos_light, edge.distance2) * techniques.eye_hits / emitter.pdf_a;
-        let emission = techniques.emission_pdf_w(&emitter, -edge.w);
-        let e = self.others(techniques, per_area(emission, cos, edge.distance2), edge.w, Origin::Lamp);
-        let value = value * (heuristic.weight(heuristic.raise(l), m, e) / emitter.pdf_a);
-        Some((value, offset::between(&vertex.point, &emitter.point)))
+        let l = per_area(pdf_w, cos_light, distance2) * techniques.eye_hits(&light) / light.pdf();
+        let emission = techniques.emission_pdf(world, &light, -w, vertex.point.position);
+        let density = per_area(emission, vertex.cos_ng(w), distance2);
+        let e = self.others(techniques, density, w, Origin::Lamp);
+        let value = value * (heuristic.weight(heuristic.raise(l), m, e) / light.pdf());
+        Some((value, offset::to_light(&vertex.point, &light)))
     }
 
     /// Techniques 2 <= s <= k-2: light from a vertex of a light subpath at `offset` from here. `tries`: how often the
@@ -179,25 +231,27 @@ impl EyeVertex {
 }
 
 /// Technique s = k-1: a light vertex seen by the camera. The value, for the sum over a film's eye samples, belongs at
-/// the raster position if the ray is free.
+/// the raster position if the ray is free. `sampler` gives the point of the lens.
 pub fn connect_camera(
     world: &World<'_>,
     techniques: &Techniques,
     light: &Walk,
+    sampler: &Sampler,
 ) -> Option<(DVec2, Spectrum, Ray)> {
     let (y, m) = (&light.vertex, techniques.light_image * techniques.seen(light));
     if m == 0.0 {
         return None;
     }
-    let edge = Edge::new(world.camera.position, y.point.position)?;
-    let raster = world.camera.raster(edge.w)?;
+    let lens = world.camera.lens_point(|| sampler.u2(light.depth, Purpose::Lens));
+    let edge = Edge::new(lens, y.point.position)?;
+    let raster = world.camera.raster_from(lens, edge.w)?;
     let pdf = per_area(world.camera.pdf_w(edge.w), y.cos_ng(edge.w), edge.distance2);
     let value = light.throughput * y.factor(-edge.w, y.wo) * pdf;
     if value == Spectrum::ZERO {
         return None;
     }
     let l = techniques.light_others(light, pdf, -edge.w);
-    let ray = offset::free_to_surface(world.camera.position, &y.point);
+    let ray = offset::free_to_surface(lens, &y.point);
     Some((raster, value * (techniques.heuristic.weight(l, m, 0.0) / m), ray))
 }
 

@@ -20,6 +20,7 @@ pub mod camera;
 pub mod film;
 
 pub mod scene;
+pub mod effects;
 pub mod visibility;
 
 pub mod vertex_bvh;

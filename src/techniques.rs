@@ -1,7 +1,7 @@
 //! How often each technique tries a path, and with which lobes the roulette judges light vertices.
 
 use crate::bsdf::Transport;
-use crate::light::{EmissionGuide, EmitterPoint};
+use crate::light::{EmissionGuide, LightPoint};
 use crate::math::luminance;
 use crate::mis::Heuristic;
 use crate::roulette::{self, Lobe};
@@ -9,6 +9,7 @@ use crate::sampler::Sampler;
 use crate::subpath::walk::{Rules, Walk};
 use crate::subpath::{Role, Storing, Total, Vertex, World, from_light};
 use glam::DVec3;
+use std::f64::consts::FRAC_1_PI;
 use std::ops::Deref;
 use std::sync::Arc;
 
@@ -18,7 +19,7 @@ use std::sync::Arc;
 pub struct Techniques {
     /// How they share a path.
     pub heuristic: Heuristic,
-    /// m_0: the eye subpath hits an emitter.
+    /// m_0: the eye subpath hits an emitter, or the sky. (No eye subpath hits lamps without size.)
     pub eye_hits: f64,
     /// m_1: next-event estimation, relative to emission, which draws its points from the same density.
     pub next_event: f64,
@@ -71,7 +72,7 @@ impl Roulette {
     }
 }
 
-/// The roulette's lobes at a vertex: of reflection, and of transmission where light passes.
+/// The roulette's lobes at a vertex: of reflection, and of transmission where light passes, or of a diffuse base.
 #[derive(Debug, Clone, Copy)]
 pub struct Lobes {
     list: [Lobe; 2],
@@ -131,13 +132,18 @@ impl Techniques {
             let eta = if outside { eta } else { 1.0 / eta };
             Lobe::from_ggx_transmission(&frame, w_eye, alpha_x, alpha_y, eta, 1.0)
         });
-        for lobe in [Some(reflected), transmitted].into_iter().flatten() {
+        let axes = [Some(reflected), transmitted];
+        for lobe in axes.into_iter().flatten() {
             // Without a weight nothing would ever be kept, though there may be light beside the axis.
             let axis = lobe.frame().z;
             let weight = luminance(vertex.factor(w_eye, axis)) * vertex.cos_ng(axis);
             if weight > 0.0 {
                 lobes.push(lobe.with_weight(weight));
             }
+        }
+        if let Some(albedo) = vertex.bsdf.diffuse_base() {
+            // Half of the greatest value of f cos, the mean over the hemisphere.
+            lobes.push(Lobe::sphere(0.5 * FRAC_1_PI * luminance(albedo)));
         }
         lobes
     }
@@ -180,12 +186,18 @@ impl Techniques {
         m.known + m.stored * self.storing.probability(Role::Stored, light.origins[1])
     }
 
-    /// Density of a light subpath's first direction, 1/sr.
-    pub fn emission_pdf_w(&self, emitter: &EmitterPoint, direction: DVec3) -> f64 {
+    /// Density of the light subpath that leaves a light in a direction for the surface point `first`: 1/sr; of distant
+    /// light 1/m^2 across it.
+    pub fn emission_pdf(&self, world: &World<'_>, light: &LightPoint, direction: DVec3, first: DVec3) -> f64 {
         match &self.guide {
-            None => emitter.pdf_w(direction),
-            Some(guide) => guide.pdf_w(emitter, direction),
+            None => light.emission_pdf(world.lights.surroundings(), direction),
+            Some(guide) => guide.pdf(light, direction, first),
         }
+    }
+
+    /// How often an eye subpath that could end on a light tries.
+    pub fn eye_hits(&self, light: &LightPoint) -> f64 {
+        if light.is_delta() { 0.0 } else { self.eye_hits }
     }
 
     /// Starts a light subpath.

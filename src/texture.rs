@@ -24,13 +24,33 @@ impl Texture {
     /// The value at texture coordinates, in the image's linear units.
     pub fn lookup(&self, uv: DVec2) -> Spectrum {
         let uv = uv * self.scale + self.offset;
-        let (w, h) = (self.image.width as usize, self.image.height as usize);
-        let x = Axis::new(uv.x, w);
-        let y = Axis::new(1.0 - uv.y, h);
+        self.between(
+            Axis::new(uv.x, self.image.width as usize),
+            Axis::new(1.0 - uv.y, self.image.height as usize),
+        )
+    }
+
+    /// As [`Texture::lookup`], repeated from left to right only: above and below, the border goes on.
+    pub fn lookup_clamped(&self, uv: DVec2) -> Spectrum {
+        let uv = uv * self.scale + self.offset;
+        self.between(
+            Axis::new(uv.x, self.image.width as usize),
+            Axis::clamped(1.0 - uv.y, self.image.height as usize),
+        )
+    }
+
+    fn between(&self, x: Axis, y: Axis) -> Spectrum {
+        let w = self.image.width as usize;
         let at = |column: usize, row: usize| self.image.pixels[row * w + column].as_dvec3();
         let above = at(x.first, y.first).lerp(at(x.second, y.first), x.weight);
         let below = at(x.first, y.second).lerp(at(x.second, y.second), x.weight);
         above.lerp(below, y.weight)
+    }
+
+    /// The value, where it is the same over the whole plane.
+    pub fn constant(&self) -> Option<Spectrum> {
+        let (low, high) = self.bounds();
+        (low == high).then_some(low)
     }
 
     /// Least and greatest value of each channel over the whole plane.
@@ -56,6 +76,12 @@ impl Axis {
         let floor = x.floor();
         let first = (floor as isize).rem_euclid(pixels as isize) as usize;
         Self { first, second: if first + 1 == pixels { 0 } else { first + 1 }, weight: x - floor }
+    }
+
+    fn clamped(coordinate: f64, pixels: usize) -> Self {
+        let x = (coordinate.clamp(0.0, 1.0) * pixels as f64 - 0.5).clamp(0.0, (pixels - 1) as f64);
+        let first = x as usize;
+        Self { first, second: (first + 1).min(pixels - 1), weight: x - first as f64 }
     }
 }
 

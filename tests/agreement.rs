@@ -4,6 +4,8 @@ use crate::support::estimate::{Estimate, estimate, estimate_of};
 use crate::support::scenes;
 use hrr::film::Film;
 use hrr::integrator::Size;
+use hrr::material::Material;
+use hrr::math::Spectrum;
 use hrr::scene::Scene;
 use hrr::settings::{Backend, Integrator, Settings};
 use hrr::subpath::World;
@@ -67,6 +69,65 @@ fn all_integrators_agree_on_every_material() {
     for (seed, integrator) in others.into_iter().enumerate() {
         run(&scene, integrator, 2 + seed as u64, 64, 8).assert_agrees(&pt, 0.02, integrator.name());
     }
+}
+
+/// Lamps without size, a sun and a sky beside the emitting triangles, and a lens that blurs what is near and far. Nothing
+/// is perfectly smooth: what a mirror throws of a lamp without size, path tracing cannot find.
+#[test]
+fn all_integrators_agree_on_every_light_through_a_lens() {
+    let mut scene = scenes::box_of_everything();
+    scene.materials[3] = scene.materials[1].clone();
+    scene.materials[4] = scene.materials[5].clone();
+    scene.lights = scenes::lights_of_every_kind();
+    agree_through_a_lens(scene, 2);
+}
+
+#[test]
+fn all_integrators_agree_on_every_material_under_a_sky() {
+    let mut scene = scenes::box_of_everything();
+    scene.lights = scenes::lights_of_every_kind().split_off(3);
+    agree_through_a_lens(scene, 12);
+}
+
+#[test]
+fn all_integrators_agree_on_textures_coats_and_cutouts() {
+    let scene = scenes::box_of_textures();
+    let pt = run(&scene, Integrator::Pt, 1, 64, 16);
+    let others = [Integrator::Bpt, Integrator::Lvc, Integrator::LvcHrr, Integrator::PcbptHrr];
+    for (i, integrator) in others.into_iter().enumerate() {
+        run(&scene, integrator, 22 + i as u64, 64, 8).assert_agrees(&pt, 0.02, integrator.name());
+    }
+    // Backends decide alike where there are holes.
+    for visibility in Backend::ALL.into_iter().filter(|&b| b != Backend::BEST && b != Backend::Embree) {
+        let settings = Settings { visibility, iterations: 8, max_depth: 4, ..Settings::default() };
+        let [a, b] = [Backend::BEST, visibility].map(|visibility| {
+            estimate(&scene, &Settings { integrator: Integrator::Pt, visibility, ..settings.clone() }, 8)
+        });
+        a.assert_agrees(&b, 2e-3, "backends");
+    }
+}
+
+fn agree_through_a_lens(mut scene: Scene, seed: u64) {
+    (scene.camera.aperture_radius, scene.camera.focus_distance) = (0.1, 2.6);
+    let pt = run(&scene, Integrator::Pt, 1, 64, 16);
+    let others = [Integrator::Bpt, Integrator::Lvc, Integrator::LvcHrr, Integrator::PcbptHrr];
+    for (i, integrator) in others.into_iter().enumerate() {
+        run(&scene, integrator, seed + i as u64, 64, 8).assert_agrees(&pt, 0.02, integrator.name());
+    }
+}
+
+/// Diffuse walls only, so that light tracing sees all there is, but for the sky itself.
+#[test]
+fn light_tracing_agrees_on_every_light_through_a_lens() {
+    let mut scene = scenes::box_of_everything();
+    for material in scene.materials.iter_mut().filter(|m| !m.emits()) {
+        *material = Material::diffuse("white", Spectrum::splat(0.6));
+    }
+    scene.lights = scenes::lights_of_every_kind();
+    (scene.camera.aperture_radius, scene.camera.focus_distance) = (0.1, 2.6);
+    scene.camera.origin.z = 1.8;
+    let pt = run(&scene, Integrator::Pt, 1, 64, 16);
+    run(&scene, Integrator::Lt, 2, 64, 16).assert_agrees(&pt, 0.02, "lt");
 }
 
 /// Merging blurs by its radius, here a hundredth of the room's: less than the noise.

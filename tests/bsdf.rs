@@ -7,6 +7,7 @@ use glam::DVec3;
 use hrr::bsdf::{Bsdf, Conductor, Dielectric, Lambert, Reflectance};
 use hrr::math::Spectrum;
 
+mod coated;
 mod distribution;
 mod energy;
 mod precision;

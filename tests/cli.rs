@@ -186,6 +186,37 @@ fn what_is_to_come_is_exit_code_5() {
 }
 
 #[test]
+fn effects_are_told_as_the_contract_says() {
+    let place = Place::new();
+    let (code, out, err) = place.run("effects scene.toml --format json -q");
+    assert_eq!((code, err.as_str()), (0, ""), "{out}");
+    let report: serde_json::Value = serde_json::from_str(&out).unwrap();
+    let ids: Vec<_> =
+        report["effects"].as_array().unwrap().iter().map(|e| e["id"].as_str().unwrap()).collect();
+    assert_eq!(
+        ids.join(" "),
+        "direct interreflection light_subpaths caustics sdg sds specular refraction opacity textures \
+         emission_textures normal_maps anisotropy environment lens two_sided_emission"
+    );
+    let direct = &report["effects"][0];
+    assert_eq!((&direct["verdict"], &direct["machinery"][0]), (&"wanted".into(), &"next_event".into()));
+    assert!(direct["cost_percent"].is_number() && !direct["why"].as_str().unwrap().is_empty());
+    assert!(report["plan"]["integrator"].is_string() && report["plan"]["machinery"].is_array());
+
+    let (code, out, _) = place.run("effects scene.toml --why direct");
+    assert!(code == 0 && out.starts_with("direct: wanted: ") && out.contains("first triangle"), "{out}");
+    let (code, out, _) = place.run("effects scene.toml");
+    assert!(code == 0 && out.starts_with("effect ") && out.contains("\nplan: "), "{out}");
+    let (code, _, err) = place.run("effects scene.toml --why caustic");
+    assert!(code == 2 && err.contains("did you mean 'caustics'?"), "{err}");
+    // What is left out is said in the image.
+    let (code, _, err) = place.run("render scene.toml -o a.exr --without direct");
+    assert!(code == 0 && err.contains("the image is biased"), "{err}");
+    let attributes = image::read_attributes(&place.path("a.exr")).unwrap();
+    assert_eq!(attributes.get("hrr:biased"), Some(&Value::Int(1)));
+}
+
+#[test]
 fn images_and_statistics_are_written() {
     let place = Place::new();
     let (code, out, err) = place.run("render scene.toml -o a.exr -o b.png --stats s.json --exposure 1");

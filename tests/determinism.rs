@@ -12,9 +12,16 @@ fn bits(film: &Film) -> Vec<[u64; 3]> {
 
 fn run(integrator: Integrator, threads: usize, first_iteration: u64, iterations: u64) -> Film {
     let scene = scenes::box_of_everything();
-    let visibility = Backend::Obvhs;
-    let settings =
-        Settings { integrator, threads, first_iteration, iterations, visibility, ..Settings::default() };
+    let settings = Settings {
+        integrator,
+        threads,
+        first_iteration,
+        iterations,
+        visibility: Backend::Obvhs,
+        // Light tracing sees no mirrors.
+        without: "specular".parse().unwrap(),
+        ..Settings::default()
+    };
     render(&scene, &settings, &Silent).unwrap().film
 }
 

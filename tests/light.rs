@@ -6,7 +6,7 @@ use crate::support::distribution::{Distribution, Outcome};
 use crate::support::stats::{Family, Moments};
 use glam::{DVec2, DVec3, Vec3};
 use hrr::geometry::{Mesh, SurfacePoint};
-use hrr::light::{EmissionGuide, Lights};
+use hrr::light::{AreaLights, EmissionGuide, LightPoint, Lights};
 use hrr::material::Material;
 use hrr::math::{Spectrum, luminance};
 use std::f64::consts::PI;
@@ -65,7 +65,7 @@ impl Chart<SurfacePoint> for OnTriangle<'_> {
     }
 }
 
-fn test_points(mesh: &Mesh, lights: &Lights, pdf: impl Fn(&SurfacePoint) -> f64) -> Outcome {
+fn test_points(mesh: &Mesh, lights: &AreaLights, pdf: impl Fn(&SurfacePoint) -> f64) -> Outcome {
     let mut rng = Random::new(71);
     let charts = [1, 3, 4].map(|triangle| OnTriangle { mesh, triangle });
     let atlas = charts.each_ref().map(|c| c as &dyn Chart<SurfacePoint>);
@@ -76,7 +76,7 @@ fn test_points(mesh: &Mesh, lights: &Lights, pdf: impl Fn(&SurfacePoint) -> f64)
 #[test]
 fn points_are_drawn_as_their_density_says() {
     let (mesh, materials) = (mesh(), materials());
-    let lights = Lights::new(&mesh, &materials);
+    let lights = AreaLights::new(&mesh, &materials);
     assert_eq!(lights.len(), 3);
     let good = test_points(&mesh, &lights, |p| lights.at(p).map_or(0.0, |e| e.pdf_a));
     assert!((good.total - 1.0).abs() < 1e-9 && good.drawn == 1.0, "{good:?}");
@@ -90,7 +90,7 @@ fn points_are_drawn_as_their_density_says() {
 #[test]
 fn a_point_that_is_hit_is_the_point_that_is_drawn() {
     let (mesh, materials) = (mesh(), materials());
-    let lights = Lights::new(&mesh, &materials);
+    let lights = AreaLights::new(&mesh, &materials);
     let mut rng = Random::new(72);
     for _ in 0..1000 {
         let drawn = lights.sample_point(rng.u1(), rng.u2()).unwrap();
@@ -109,7 +109,7 @@ fn a_point_that_is_hit_is_the_point_that_is_drawn() {
 #[test]
 fn directions_are_drawn_as_their_density_says() {
     let (mesh, materials) = (mesh(), materials());
-    let lights = Lights::new(&mesh, &materials);
+    let lights = AreaLights::new(&mesh, &materials);
     let mut family = Family::default();
     for triangle in [1, 3, 4] {
         let point = SurfacePoint::at_barycentric(&mesh, triangle, 0.2, 0.3);
@@ -131,19 +131,21 @@ fn directions_are_drawn_as_their_density_says() {
 #[test]
 fn guided_directions_carry_the_same_power() {
     let (mesh, materials) = (mesh(), materials());
-    let lights = Lights::new(&mesh, &materials);
+    let lights = Lights::new(&mesh, &materials, &[]);
     for triangle in [1, 3] {
         let emitter = lights.at(&SurfacePoint::at_barycentric(&mesh, triangle, 0.2, 0.3)).unwrap();
-        let useful = emitter.sample_direction(DVec2::new(0.8, 0.3)).unwrap();
-        let guide = EmissionGuide::learn(&lights, [(emitter, useful, 2.0)].into_iter()).unwrap();
+        let light = LightPoint::Surface(emitter);
+        let at = DVec2::new(0.8, 0.3);
+        let useful = emitter.sample_direction(at).unwrap();
+        let guide = EmissionGuide::learn(&lights, [(light, at, 2.0)].into_iter()).unwrap();
         let mut rng = Random::new(75);
         let (mut near, mut inverse, mut sides) = (Moments::default(), Moments::default(), Moments::default());
         for _ in 0..400_000 {
-            let w = emitter.sample_direction(guide.warp(&emitter, rng.u2())).unwrap();
+            let w = emitter.sample_direction(guide.warp(&light, rng.u2())).unwrap();
             near.push(f64::from(w.dot(useful) > 0.99));
             // The mean of 1/density is the measure of all directions: the hemisphere, or both of them.
-            inverse.push(emitter.pdf_w(w) / guide.pdf_w(&emitter, w));
-            sides.push(emitter.pdf_w(w) / guide.pdf_w(&emitter, w) * w.dot(useful));
+            inverse.push(emitter.pdf_w(w) / guide.pdf(&light, w, DVec3::ZERO));
+            sides.push(emitter.pdf_w(w) / guide.pdf(&light, w, DVec3::ZERO) * w.dot(useful));
         }
         assert!(near.mean() > 0.5, "{}", near.mean());
         assert!(inverse.z_test(1.0, 0.0) > 1e-5, "{}", inverse.mean());
@@ -159,7 +161,7 @@ fn guided_directions_carry_the_same_power() {
 #[test]
 fn emission_carries_the_power_of_the_scene() {
     let (mesh, materials) = (mesh(), materials());
-    let lights = Lights::new(&mesh, &materials);
+    let lights = AreaLights::new(&mesh, &materials);
     let power = PI * (RED * (mesh.area(1) + mesh.area(4)) + BLUE * 2.0 * mesh.area(3));
     let mut rng = Random::new(74);
     let mut seen = [Moments::default(); 3];
@@ -180,7 +182,7 @@ fn emission_carries_the_power_of_the_scene() {
 #[test]
 fn radiance_leaves_the_front_only_unless_told() {
     let (mesh, materials) = (mesh(), materials());
-    let lights = Lights::new(&mesh, &materials);
+    let lights = AreaLights::new(&mesh, &materials);
     for (triangle, emission, behind) in [(1, RED, Spectrum::ZERO), (3, BLUE, BLUE)] {
         let emitter = lights.at(&SurfacePoint::at_barycentric(&mesh, triangle, 0.3, 0.3)).unwrap();
         let n = emitter.point.ng;
@@ -194,7 +196,7 @@ fn radiance_leaves_the_front_only_unless_told() {
 #[test]
 fn a_scene_without_emitters_draws_nothing() {
     let dark = vec![materials().swap_remove(0); 3];
-    let lights = Lights::new(&mesh(), &dark);
+    let lights = AreaLights::new(&mesh(), &dark);
     assert!(lights.is_empty() && lights.sample_point(0.5, DVec2::splat(0.5)).is_none());
     assert!(lights.at(&SurfacePoint::at_barycentric(&mesh(), 1, 0.2, 0.2)).is_none());
 }

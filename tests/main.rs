@@ -9,6 +9,7 @@ mod support;
 
 mod bsdf;
 mod light;
+mod light_sources;
 mod warps;
 mod image;
 mod settings;
@@ -18,6 +19,7 @@ mod closed_form;
 mod ray_offset;
 mod visibility;
 mod determinism;
+mod effects;
 mod layers;
 mod mis;
 mod ffi;

@@ -6,6 +6,8 @@ use hrr::settings::{Backend, Heuristic, Integrator, Kind, Setting, Settings, Swi
 fn other_value(name: &str) -> &'static str {
     match name {
         "integrator" => "lvc+hrr",
+        "with" => "sds",
+        "without" => "caustics,lens",
         "max_depth" => "7",
         "samples" => "2",
         "light_subpaths" => "1234",
@@ -45,6 +47,8 @@ fn every_field_has_its_row() {
     // A pattern without `..`: a field that is added to the struct must be added here, and to the table.
     let Settings {
         integrator,
+        with,
+        without,
         max_depth,
         visibility,
         iterations,
@@ -74,7 +78,8 @@ fn every_field_has_its_row() {
     assert_eq!((threads, memory, expected, hrr_alpha, mis), (2, 3.5, 0.25, 0.125, Heuristic::Power));
     assert_eq!((merge_radius, merge_pixels, merge_shrink), (0.5, 5.0, 1.0));
     assert_eq!((reused_subpaths, record_spacing), (50, 4));
-    assert_eq!((storing, guiding, adaptive, TABLE.len()), (0.5, Switch::Off, Switch::Off, 23));
+    assert_eq!((storing, guiding, adaptive, TABLE.len()), (0.5, Switch::Off, Switch::Off, 25));
+    assert_eq!((with.to_string(), without.to_string()), ("sds".into(), "caustics,lens".into()));
 }
 
 #[test]

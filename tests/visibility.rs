@@ -2,11 +2,16 @@
 
 use crate::support::Random;
 use crate::support::shapes::{ball, cube, mesh, moved, soup};
-use glam::{DVec3, Vec3};
+use glam::{DVec2, DVec3, Vec3};
 use hrr::Error;
 use hrr::geometry::Mesh;
+use hrr::image::Image;
+use hrr::material::{Maps, Material};
+use hrr::math::Spectrum;
 use hrr::settings::Backend;
-use hrr::visibility::{Hit, Ray, Visibility, build};
+use hrr::texture::Texture;
+use hrr::visibility::{Cutouts, Hit, Ray, Visibility, build, build_with_cutouts};
+use std::sync::Arc;
 
 /// The backends of this build.
 pub const BACKENDS: &[Backend] = if cfg!(feature = "embree") {
@@ -265,4 +270,47 @@ fn a_triangle_that_is_there_twice_is_hit_once() {
         }
         assert!(hits > 200, "{hits}");
     }
+}
+
+/// Checkered holes, and surfaces that are there in part: all backends decide alike, as often as they should.
+#[test]
+fn cutouts_are_the_same_in_every_backend() {
+    let mut random = Random::new(8);
+    let mut mesh = soup(&mut random, 2000, 0.15);
+    mesh.uvs = mesh.positions.iter().map(|_| random.u2().as_vec2() * 3.0).collect();
+    mesh.materials = (0..2000).map(|i| i % 3).collect();
+    let opaque = Material::diffuse("opaque", Spectrum::ONE);
+    let (mut veil, mut checkered) = (opaque.clone(), opaque.clone());
+    veil.opacity = 0.3;
+    let pixels = vec![Vec3::ONE, Vec3::ZERO, Vec3::ZERO, Vec3::ONE];
+    let map = Texture::new(Arc::new(Image { width: 2, height: 2, pixels }), DVec2::ONE, DVec2::ZERO);
+    checkered.set_maps(Maps { opacity: Some(map), ..Maps::default() });
+    assert!(Cutouts::new(&mesh, &[opaque.clone(), opaque.clone(), opaque.clone()]).is_none());
+    let cutouts = Cutouts::new(&mesh, &[opaque, veil, checkered]).unwrap();
+    let built: Vec<_> = BACKENDS
+        .iter()
+        .map(|&backend| build_with_cutouts(backend, &mesh, Some(cutouts.clone()), 1).unwrap())
+        .collect();
+    let solid = build(Backend::Brute, &mesh, 1).unwrap();
+    let (mut differing, mut stopped, mut met) = (0, [0; 3], [0; 3]);
+    let rays = 10_000;
+    for _ in 0..rays {
+        let ray = random_ray(&mut random, 1.0);
+        let answers: Vec<_> = built.iter().map(|b| b.intersect(&ray)).collect();
+        for (structure, answer) in built.iter().zip(&answers) {
+            assert_eq!(structure.occluded(&ray), answer.is_some(), "{ray:?}");
+            differing += usize::from(answer.map(|h| h.triangle) != answers[0].map(|h| h.triangle));
+        }
+        if let Some(first) = solid.intersect(&ray) {
+            let material = mesh.materials[first.triangle as usize] as usize;
+            met[material] += 1;
+            stopped[material] += usize::from(answers[0].is_some_and(|h| h.triangle == first.triangle));
+        }
+    }
+    assert!(differing < rays / 500, "{differing} of {rays} answers differ");
+    let share = [0, 1, 2].map(|m| stopped[m] as f64 / met[m] as f64);
+    assert!(
+        share[0] == 1.0 && (share[1] - 0.3).abs() < 0.05 && (share[2] - 0.5).abs() < 0.05,
+        "{share:?} {met:?}"
+    );
 }

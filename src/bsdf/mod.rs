@@ -10,7 +10,9 @@ pub mod ggx;
 pub mod mirror;
 pub mod conductor;
 pub mod dielectric;
+pub mod coated;
 
+pub use coated::Coated;
 pub use conductor::Conductor;
 pub use dielectric::Dielectric;
 pub use fresnel::Reflectance;
@@ -64,6 +66,8 @@ pub enum Bsdf {
     Dielectric(Dielectric),
     /// Perfect reflection.
     Mirror(Mirror),
+    /// A glossy or smooth coat over a diffuse base.
+    Coated(Coated),
 }
 
 impl Bsdf {
@@ -75,6 +79,7 @@ impl Bsdf {
             Self::Lambert(b) => b.eval(w_eye, w_light),
             Self::Conductor(b) => b.eval(w_eye, w_light),
             Self::Dielectric(b) => b.eval(w_eye, w_light),
+            Self::Coated(b) => b.eval(w_eye, w_light),
             Self::Mirror(_) => Spectrum::ZERO,
         }
     }
@@ -86,6 +91,7 @@ impl Bsdf {
             Self::Lambert(b) => b.pdf(wo, wi),
             Self::Conductor(b) => b.pdf(wo, wi),
             Self::Dielectric(b) => b.pdf(wo, wi),
+            Self::Coated(b) => b.pdf(wo, wi),
             Self::Mirror(_) => 0.0,
         }
     }
@@ -98,6 +104,7 @@ impl Bsdf {
             Self::Conductor(b) => b.sample(wo, u),
             Self::Dielectric(b) => b.sample(wo, transport, lobe, u),
             Self::Mirror(b) => b.sample(wo),
+            Self::Coated(b) => b.sample(wo, lobe, u),
         }
     }
 
@@ -105,7 +112,7 @@ impl Bsdf {
     #[inline(always)]
     pub fn is_delta(&self) -> bool {
         match self {
-            Self::Lambert(_) => false,
+            Self::Lambert(_) | Self::Coated(_) => false,
             Self::Conductor(b) => b.is_delta(),
             Self::Dielectric(b) => b.is_delta(),
             Self::Mirror(_) => true,
@@ -121,6 +128,7 @@ impl Bsdf {
             Self::Conductor(b) => b.survival(),
             Self::Dielectric(_) => 1.0,
             Self::Mirror(b) => b.survival(),
+            Self::Coated(b) => b.survival(),
         }
     }
 
@@ -130,6 +138,21 @@ impl Bsdf {
             Self::Lambert(_) | Self::Mirror(_) => None,
             Self::Conductor(b) => b.glossy(),
             Self::Dielectric(b) => b.glossy(),
+            Self::Coated(b) => b.glossy(),
+        }
+    }
+
+    /// Reflectance of the diffuse lobe beside the glossy or delta one, if the model has both.
+    pub fn diffuse_base(&self) -> Option<Spectrum> {
+        if let Self::Coated(b) = self { Some(b.albedo()) } else { None }
+    }
+
+    /// The greater GGX roughness of the narrowest lobe, 0 for delta lobes; `None` for diffuse models.
+    pub fn narrowest(&self) -> Option<f64> {
+        match (self.glossy(), self) {
+            (_, Self::Lambert(_)) => None,
+            (Some(glossy), _) => Some(glossy.alpha_x.max(glossy.alpha_y)),
+            (None, _) => Some(0.0),
         }
     }
 }

@@ -27,6 +27,8 @@ pub struct Shading {
     pub frame: Frame,
     /// Texture coordinates (barycentric ones where the mesh has none).
     pub uv: DVec2,
+    /// 1 where the texture's v direction is on the side of the frame's y axis, -1 where the texture is mirrored.
+    pub handedness: f64,
 }
 
 impl SurfacePoint {
@@ -69,16 +71,26 @@ impl SurfacePoint {
     pub fn shading(&self, mesh: &Mesh) -> Shading {
         let ns = if mesh.normals.is_empty() { self.ng } else { self.shading_normal(mesh) };
         if mesh.uvs.is_empty() {
-            return Shading { frame: Frame::from_z(ns), uv: self.barycentric };
+            return Shading { frame: Frame::from_z(ns), uv: self.barycentric, handedness: 1.0 };
         }
         let [a, b, c] = mesh.corners(self.triangle);
         let t = mesh.triangles[self.triangle as usize].map(|i| mesh.uvs[i as usize].as_dvec2());
         let (d1, d2) = (t[1] - t[0], t[2] - t[0]);
         let det = d1.perp_dot(d2);
-        let tangent = ((b - a) * d2.y - (c - a) * d1.y) * det.signum();
+        let handedness = det.signum();
+        let tangent = ((b - a) * d2.y - (c - a) * d1.y) * handedness;
         let uv = t[0] + d1 * self.barycentric.x + d2 * self.barycentric.y;
         let frame = if det == 0.0 { Frame::from_z(ns) } else { Frame::from_z_tangent(ns, tangent) };
-        Shading { frame, uv }
+        Shading { frame, uv, handedness }
+    }
+
+    /// Texture coordinates alone.
+    pub fn uv(&self, mesh: &Mesh) -> DVec2 {
+        if mesh.uvs.is_empty() {
+            return self.barycentric;
+        }
+        let t = mesh.triangles[self.triangle as usize].map(|i| mesh.uvs[i as usize].as_dvec2());
+        t[0] + (t[1] - t[0]) * self.barycentric.x + (t[2] - t[0]) * self.barycentric.y
     }
 
     /// Interpolated, on the front face's side.

@@ -6,7 +6,7 @@ use super::records::Records;
 use super::spread::{Adaptive, Seen};
 use super::tile::{self, Sample};
 use super::{Integrator, Size};
-use crate::connect::{self, EyeVertex};
+use crate::connect::{self, EyeVertex, Onward};
 use crate::error::Result;
 use crate::film::Film;
 use crate::light_cache::LightCache;
@@ -193,7 +193,7 @@ impl<'a> Bidirectional<'a> {
                     }
                     if let Some(film) = film.filter(|_| self.recipe.light_image)
                         && let Some((raster, value, ray)) =
-                            connect::connect_camera(world, &self.techniques, &light)
+                            connect::connect_camera(world, &self.techniques, &light, &sampler)
                         && tally.connection(!world.visibility.occluded(&ray))
                     {
                         film.add(raster, value);
@@ -245,8 +245,8 @@ impl<'a> Bidirectional<'a> {
     fn radiance(&self, sample: &Sample, clock: Clock, tally: &mut Tally) -> Seen {
         let (world, techniques) = (self.world, &self.techniques);
         let (mut rest, mut kept) = (Spectrum::ZERO, Spectrum::ZERO);
-        let mut eye = EyeVertex::first(world, techniques, sample.raster);
-        while let Some(vertex) = eye {
+        let mut eye = EyeVertex::first(world, techniques, sample.raster, &sample.sampler);
+        while let Onward::Vertex(vertex) = eye {
             rest += vertex.emitted(world, techniques);
             if !self.recipe.eye_subpaths || vertex.walk.depth == self.settings.max_depth {
                 break;
@@ -270,6 +270,9 @@ impl<'a> Bidirectional<'a> {
                 rest += self.merge(&vertex, tally);
             }
             eye = vertex.next(world, techniques, &sample.sampler);
+        }
+        if let Onward::Sky(light) = eye {
+            rest += light;
         }
         let roulette = kept * sample.plays;
         Seen { radiance: rest + roulette, roulette }

@@ -52,8 +52,8 @@ impl Bidirectional<'_> {
         let observations = found.into_iter().flatten().filter_map(|(vertex, score)| {
             let subpath = self.cache.subpath_of(vertex as usize) as u64;
             let sampler = Sampler::in_family(seed, 0, Stream::GuideLight, subpath >> 32, subpath as u32);
-            let (emitter, direction) = from_light::start(world, None, &sampler)?;
-            Some((emitter, direction, score))
+            let (light, u) = from_light::start(world, None, &sampler)?;
+            Some((light, u, score))
         });
         self.techniques.guide = EmissionGuide::learn(&world.lights, observations).map(Arc::new);
         self.size = size;
@@ -65,7 +65,7 @@ impl Bidirectional<'_> {
         let (world, film) = (self.world, &self.world.scene.film);
         let sampler = Sampler::new(self.settings.seed, 0, Stream::GuideEye, index);
         let raster = sampler.u2(0, Purpose::Raster) * DVec2::new(film.width.into(), film.height.into());
-        let mut eye = EyeVertex::first(world, &self.techniques, raster);
+        let mut eye = EyeVertex::first(world, &self.techniques, raster, &sampler).vertex();
         let mut tally = Tally::default();
         while let Some(vertex) = eye.filter(|v| v.walk.depth < self.settings.max_depth) {
             if !vertex.lobes.is_empty() {
@@ -73,7 +73,7 @@ impl Bidirectional<'_> {
                     found.push((light, luminance(value)));
                 });
             }
-            eye = vertex.next(world, &self.techniques, &sampler);
+            eye = vertex.next(world, &self.techniques, &sampler).vertex();
         }
     }
 }

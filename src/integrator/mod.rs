@@ -2,6 +2,7 @@
 //! pool of their own: work is spread over the rayon pool that they are called in.
 
 pub mod recipe;
+pub mod plan;
 pub mod path;
 pub mod bidirectional;
 mod guiding;
@@ -10,6 +11,7 @@ mod records;
 mod spread;
 mod tile;
 
+pub use plan::Plan;
 pub use recipe::Recipe;
 
 use crate::error::Result;

@@ -29,16 +29,23 @@ impl<'a> PathTracer<'a> {
         Self { world, settings, samples: Size::of(settings, &world.scene.film).samples, adaptive: None }
     }
 
-    fn radiance(&self, sample: &Sample, clock: Clock, tally: &mut Tally) -> Spectrum {
+    /// `LIGHTS`: whether there are lights beside emitting triangles.
+    fn radiance<const LIGHTS: bool>(&self, sample: &Sample, clock: Clock, tally: &mut Tally) -> Spectrum {
         let world = self.world;
-        let mut direction = world.camera.direction(sample.raster);
-        let mut origin = world.camera.position;
+        let mut origin = world.camera.lens_point(|| sample.sampler.u2(0, Purpose::Lens));
+        let mut direction = world.camera.direction_from(origin, sample.raster);
         let mut ray = offset::from_free_point(origin, direction);
         let (mut sum, mut throughput) = (Spectrum::ZERO, Spectrum::ONE);
         // Density of the last direction; `None` when next-event estimation could not have found what it hits.
         let mut pdf_direction = None;
         for depth in 1..=self.settings.max_depth {
-            let Some(point) = world.intersect(&ray, origin, direction) else { break };
+            let Some(point) = world.intersect(&ray, origin, direction) else {
+                if LIGHTS && let Some(sky) = world.lights.sky(direction) {
+                    let weight = pdf_direction.map_or(1.0, |pdf_w: f64| pdf_w / (pdf_w + sky.pdf));
+                    sum += throughput * sky.radiance * weight;
+                }
+                break;
+            };
             if let Some(emitter) = world.lights.at(&point) {
                 let weight = pdf_direction.map_or(1.0, |pdf_w: f64| {
                     let distance2 = (point.position - origin).length_squared();
@@ -54,8 +61,13 @@ impl<'a> PathTracer<'a> {
             // Both rays are made before either is traced: the processor then works on them side by side.
             let scattered = vertex.sample(Transport::Radiance, &sample.sampler, depth);
             let next = scattered.map(|s| (offset::leave(&point, s.wi), s));
-            let light =
-                if vertex.bsdf.is_delta() { None } else { self.direct(&vertex, &sample.sampler, depth) };
+            let light = if vertex.bsdf.is_delta() {
+                None
+            } else if LIGHTS {
+                self.direct_of_any(&vertex, &sample.sampler, depth)
+            } else {
+                self.direct(&vertex, &sample.sampler, depth)
+            };
             if let Some((value, shadow_ray)) = light {
                 let visibility = &world.visibility;
                 let free = clock.time(&mut tally.visibility, || !visibility.occluded(&shadow_ray));
@@ -75,7 +87,7 @@ impl<'a> PathTracer<'a> {
     /// free.
     fn direct(&self, vertex: &Vertex, sampler: &Sampler, depth: u32) -> Option<(Spectrum, Ray)> {
         let (pick, u) = (sampler.u1(depth, Purpose::LightPick), sampler.u2(depth, Purpose::LightPoint));
-        let emitter = self.world.lights.sample_point(pick, u)?;
+        let emitter = self.world.lights.area.sample_point(pick, u)?;
         let to = emitter.point.position - vertex.point.position;
         let distance2 = to.length_squared();
         let wi = to * (1.0 / distance2.sqrt());
@@ -91,6 +103,18 @@ impl<'a> PathTracer<'a> {
         let cos = emitter.point.ng.dot(wi).abs();
         let value = scattered * radiance * (cos / (emitter.pdf_a * distance2 + pdf_w * cos));
         Some((value, offset::between(&vertex.point, &emitter.point)))
+    }
+
+    /// As [`PathTracer::direct`], from lights of all kinds.
+    fn direct_of_any(&self, vertex: &Vertex, sampler: &Sampler, depth: u32) -> Option<(Spectrum, Ray)> {
+        let (pick, u) = (sampler.u1(depth, Purpose::LightPick), sampler.u2(depth, Purpose::LightPoint));
+        let light = self.world.lights.sample(pick, u)?;
+        let to = light.toward(vertex.point.position)?;
+        let (scattered, pdf_w) = vertex.toward_light(to.w);
+        // Scattering by chance meets surfaces and the sky only.
+        let pdf_w = if light.is_delta() { 0.0 } else { pdf_w };
+        let value = scattered * to.radiance * (to.cos / (light.pdf() * to.distance2 + pdf_w * to.cos));
+        (value != Spectrum::ZERO).then(|| (value, offset::to_light(&vertex.point, &light)))
     }
 }
 
@@ -112,9 +136,16 @@ impl Integrator for PathTracer<'_> {
         let start = Instant::now();
         // Set aside, since the samples look at the rest of the path tracer.
         let mut adaptive = self.adaptive.take();
-        let mut tally = tile::sample_film(film, key, adaptive.as_mut(), progress, |sample, clock, tally| {
-            self.radiance(sample, clock, tally).into()
-        });
+        let spread = adaptive.as_mut();
+        let mut tally = if self.world.lights.only_area() {
+            tile::sample_film(film, key, spread, progress, |sample, clock, tally| {
+                self.radiance::<false>(sample, clock, tally).into()
+            })
+        } else {
+            tile::sample_film(film, key, spread, progress, |sample, clock, tally| {
+                self.radiance::<true>(sample, clock, tally).into()
+            })
+        };
         self.adaptive = adaptive;
         tally.sides[1] = start.elapsed().as_secs_f64();
         film.count_samples(u64::from(self.samples));

@@ -135,7 +135,7 @@ fn trace(
     raster: DVec2,
 ) -> (Vec<Record>, u64) {
     let (mut records, mut rays) = (Vec::new(), 0);
-    let mut eye = EyeVertex::first(world, techniques, raster);
+    let mut eye = EyeVertex::first(world, techniques, raster, sampler).vertex();
     while let Some(vertex) = eye.filter(|v| v.walk.depth < settings.max_depth) {
         if !vertex.walk.vertex.bsdf.is_delta() && vertex.lobes.is_empty() {
             let contributions: Vec<f64> = lights
@@ -154,7 +154,7 @@ fn trace(
                 records.push(Record { position: vertex.walk.vertex.point.position, contributions });
             }
         }
-        eye = vertex.next(world, techniques, sampler);
+        eye = vertex.next(world, techniques, sampler).vertex();
     }
     (records, rays)
 }

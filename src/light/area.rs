@@ -6,12 +6,13 @@ use crate::material::Material;
 use crate::math::{Discrete, Frame, Spectrum, luminance, warp};
 use glam::{DVec2, DVec3};
 use std::f64::consts::PI;
+use std::sync::Arc;
 
 const NOT_EMITTING: u32 = u32::MAX;
 
 /// All emitting triangles of a scene.
 #[derive(Debug, Clone, Default)]
-pub struct Lights {
+pub struct AreaLights {
     emitters: Vec<Emitter>,
     pick: Discrete,
     of_triangle: Vec<u32>,
@@ -28,7 +29,22 @@ struct Emitter {
     two_sided: bool,
     /// Density of points over this triangle, pick included, 1/m^2.
     pdf_a: f64,
+    /// `None` where every point emits the same.
+    pattern: Option<Box<Pattern>>,
 }
+
+/// How emission varies over a triangle.
+#[derive(Debug, Clone)]
+struct Pattern {
+    /// Texture coordinates of the corners.
+    uvs: [DVec2; 3],
+    material: Arc<Material>,
+}
+
+/// Points across a triangle at which emission is looked up to tell how much the triangle emits.
+const PROBES: u32 = 16;
+/// Part of the brightest emission that every triangle of a material is taken to emit at least: none is left out.
+const LEAST: f64 = 0.05;
 
 /// A point on an emitter.
 #[derive(Debug, Clone, Copy)]
@@ -45,17 +61,23 @@ pub struct EmitterPoint {
     pub emitter: u32,
 }
 
-impl Lights {
+impl AreaLights {
     /// Collects the emitting triangles. Degenerate ones emit nothing.
     pub fn new(mesh: &Mesh, materials: &[Material]) -> Self {
         let mut emitters = Vec::new();
         let mut weights = Vec::new();
         let mut of_triangle = Vec::new();
+        let uneven: Vec<Option<Arc<Material>>> =
+            materials.iter().map(|m| Pattern::is_needed(m).then(|| Arc::new(m.clone()))).collect();
         for triangle in 0..mesh.triangles.len() as u32 {
-            let material = &materials[mesh.materials[triangle as usize] as usize];
+            let number = mesh.materials[triangle as usize] as usize;
+            let material = &materials[number];
             let (area, corners) = (mesh.area(triangle), mesh.corners(triangle));
             let sides = if material.two_sided_emission { 2.0 } else { 1.0 };
-            let power = PI * sides * area * luminance(material.emission);
+            let pattern = uneven[number].as_ref().map(|material| Pattern::new(mesh, triangle, material));
+            let even = material.emission_at(DVec2::ZERO);
+            let mean = pattern.as_ref().map_or(luminance(even), |pattern| pattern.mean());
+            let power = PI * sides * area * mean;
             if !(power > 0.0) {
                 continue;
             }
@@ -70,9 +92,10 @@ impl Lights {
                 corners,
                 ng: mesh.scaled_normal(triangle).normalize(),
                 error: SurfacePoint::error_on(&corners),
-                emission: material.emission,
+                emission: even,
                 two_sided: material.two_sided_emission,
                 pdf_a: 1.0 / area,
+                pattern: pattern.map(Box::new),
             });
         }
         let pick = Discrete::new(weights).unwrap_or_default();
@@ -85,6 +108,16 @@ impl Lights {
     /// True when nothing emits.
     pub fn is_empty(&self) -> bool {
         self.emitters.is_empty()
+    }
+
+    /// Luminance of all their light, W.
+    pub(super) fn power(&self) -> f64 {
+        self.pick.total()
+    }
+
+    /// Makes room for other lights, which get the rest of all picks.
+    pub(super) fn scale_densities(&mut self, share: f64) {
+        self.emitters.iter_mut().for_each(|e| e.pdf_a *= share);
     }
 
     /// Number of emitting triangles.
@@ -116,7 +149,12 @@ impl Lights {
             triangle: emitter.triangle,
             error: emitter.error,
         };
-        Some(emitter.at(index as u32, point))
+        let mut point = emitter.at(index as u32, point);
+        if let Some(pattern) = &emitter.pattern {
+            // A path that meets the emitter by chance meets it as often as it is opaque.
+            point.emission *= pattern.material.opacity_at(pattern.uv(uv));
+        }
+        Some(point)
     }
 
     /// The emitter's side of a point that a path has hit, `None` when its triangle does not emit.
@@ -132,8 +170,47 @@ impl Lights {
 impl Emitter {
     #[inline(always)]
     fn at(&self, emitter: u32, point: SurfacePoint) -> EmitterPoint {
-        let &Self { emission, two_sided, pdf_a, .. } = self;
+        let &Self { mut emission, two_sided, pdf_a, .. } = self;
+        if let Some(pattern) = &self.pattern {
+            emission = pattern.material.emission_at(pattern.uv(point.barycentric));
+        }
         EmitterPoint { point, emission, two_sided, pdf_a, emitter }
+    }
+}
+
+impl Pattern {
+    /// Whether a material's emission varies.
+    fn is_needed(material: &Material) -> bool {
+        let varies = material.maps().emission.as_ref().is_some_and(|map| map.constant().is_none());
+        material.emits() && (varies || !material.is_opaque())
+    }
+
+    fn new(mesh: &Mesh, triangle: u32, material: &Arc<Material>) -> Self {
+        let uvs = if mesh.uvs.is_empty() {
+            [DVec2::ZERO, DVec2::X, DVec2::Y]
+        } else {
+            mesh.triangles[triangle as usize].map(|v| mesh.uvs[v as usize].as_dvec2())
+        };
+        Self { uvs, material: material.clone() }
+    }
+
+    fn uv(&self, b: DVec2) -> DVec2 {
+        self.uvs[0] * (1.0 - b.x - b.y) + self.uvs[1] * b.x + self.uvs[2] * b.y
+    }
+
+    /// About the mean luminance over the triangle, W/(m^2 sr); above 0 wherever the material emits at all.
+    fn mean(&self) -> f64 {
+        let brightest = self.material.maps().emission.as_ref().map_or(Spectrum::ONE, |map| map.bounds().1);
+        let most = luminance(self.material.emission * brightest.max(Spectrum::ZERO));
+        let grid = (0..PROBES * PROBES).map(|i| {
+            let u = DVec2::new((i % PROBES).into(), (i / PROBES).into());
+            warp::square_to_triangle((u + 0.5) / f64::from(PROBES))
+        });
+        let at = |b: DVec2| {
+            let uv = self.uv(b);
+            luminance(self.material.emission_at(uv)) * self.material.opacity_at(uv)
+        };
+        (grid.map(at).sum::<f64>() / f64::from(PROBES * PROBES)).max(LEAST * most)
     }
 }
 

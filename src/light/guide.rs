@@ -1,11 +1,12 @@
 //! Guided emission: light subpaths start where earlier ones have proved useful.
 //!
-//! A guide is a histogram over the unit square that [`EmitterPoint::sample_direction`] turns into directions, one for
-//! all emitters of the same material and orientation. It bends the square before that, so that it knows nothing of how
-//! directions are made, and multiplies their density by one number. A share of the directions stays unguided: nothing
+//! A guide is a histogram over the unit square that [`LightPoint::emit`] turns into rays, one for all emitting triangles
+//! of the same material and orientation, and for each other light. It bends the square before that, so that it knows
+//! nothing of how rays are made, and multiplies their density by one number. A share of the directions stays unguided: nothing
 //! is lost, however wrong the histogram is.
 
-use super::{EmitterPoint, Lights};
+use super::distant::Surroundings;
+use super::{LightPoint, Lights};
 use crate::math::Discrete;
 use glam::{DVec2, DVec3};
 use std::collections::BTreeMap;
@@ -21,18 +22,19 @@ const MOST_KINDS: usize = 1024;
 /// Where light goes from each kind of emitter.
 #[derive(Debug)]
 pub struct EmissionGuide {
-    /// Kind of each emitter.
+    surroundings: Surroundings,
+    /// Kind of each light.
     kinds: Vec<u32>,
     /// Probabilities of the square's cells, for each kind.
     cells: Vec<Discrete>,
 }
 
 impl EmissionGuide {
-    /// Learns from directions in which light left, each with a score of at least 0 for how useful that was. `None` when
-    /// nothing was useful, or emitters are too different to learn from each other.
+    /// Learns from the points of the unit square that light left by, each with a score of at least 0 for how useful that
+    /// was. `None` when nothing was useful, or lights are too different to learn from each other.
     pub fn learn(
         lights: &Lights,
-        observations: impl Iterator<Item = (EmitterPoint, DVec3, f64)>,
+        observations: impl Iterator<Item = (LightPoint, DVec2, f64)>,
     ) -> Option<Self> {
         let mut numbers = BTreeMap::new();
         let kinds: Vec<u32> = lights
@@ -46,34 +48,36 @@ impl EmissionGuide {
             return None;
         }
         let mut scores = vec![[0.0; CELLS]; numbers.len()];
-        for (emitter, direction, score) in observations {
-            scores[kinds[emitter.emitter as usize] as usize][cell(emitter.square_of(direction))] += score;
+        for (light, u, score) in observations {
+            scores[kinds[light.number() as usize] as usize][cell(u)] += score;
         }
         if scores.iter().flatten().all(|&s| s == 0.0) {
             return None;
         }
         let cells = scores.iter().map(|scores| Discrete::new(shares(scores))).collect::<Option<_>>()?;
-        Some(Self { kinds, cells })
+        Some(Self { surroundings: *lights.surroundings(), kinds, cells })
     }
 
-    /// A point of the unit square to give to [`EmitterPoint::sample_direction`]; `u` is uniform in it.
-    pub fn warp(&self, emitter: &EmitterPoint, u: DVec2) -> DVec2 {
-        let (cell, rest) = self.cells_of(emitter).sample_and_rest(u.x);
+    /// A point of the unit square to give to [`LightPoint::emit`]; `u` is uniform in it.
+    pub fn warp(&self, light: &LightPoint, u: DVec2) -> DVec2 {
+        let (cell, rest) = self.cells_of(light).sample_and_rest(u.x);
         let corner = DVec2::new((cell % SIDE) as f64, (cell / SIDE) as f64);
         (corner + DVec2::new(rest, u.y)) / SIDE as f64
     }
 
-    /// Density of directions from an emitter, 1/sr: that of [`EmitterPoint::pdf_w`] as the guide changes it.
-    pub fn pdf_w(&self, emitter: &EmitterPoint, direction: DVec3) -> f64 {
-        let unguided = emitter.pdf_w(direction);
+    /// Density of the subpath from a light in a direction to a position: that of [`LightPoint::emission_pdf`] as the
+    /// guide changes it.
+    pub fn pdf(&self, light: &LightPoint, direction: DVec3, position: DVec3) -> f64 {
+        let unguided = light.emission_pdf(&self.surroundings, direction);
         if unguided == 0.0 {
             return 0.0;
         }
-        unguided * self.cells_of(emitter).probability(cell(emitter.square_of(direction))) * CELLS as f64
+        let u = light.square_of(&self.surroundings, direction, position);
+        unguided * self.cells_of(light).probability(cell(u)) * CELLS as f64
     }
 
-    fn cells_of(&self, emitter: &EmitterPoint) -> &Discrete {
-        &self.cells[self.kinds[emitter.emitter as usize] as usize]
+    fn cells_of(&self, light: &LightPoint) -> &Discrete {
+        &self.cells[self.kinds[light.number() as usize] as usize]
     }
 }
 

@@ -7,15 +7,15 @@ mod sizing;
 pub use counters::{Counters, Memory, Seconds, Stats};
 pub use observer::{Observer, Progress, Silent};
 
+use crate::effects;
 use crate::error::{Error, Result};
 use crate::film::Film;
-use crate::integrator::{self, Size};
+use crate::integrator::{self, Plan, Size};
 use crate::scene::Scene;
-use crate::settings::{Integrator, Settings, Switch};
+use crate::settings::{Settings, Switch};
 use crate::subpath::World;
 use crate::tally::Tally;
 use sizing::{Measured, Sizing};
-use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Instant;
 
@@ -28,6 +28,8 @@ pub struct Outcome {
     pub stats: Stats,
     /// Sizes that were chosen for iterations, with what each counts for; empty where the settings say them.
     pub sizes: Vec<(Size, u32)>,
+    /// What was switched on, and what is missing from the image.
+    pub plan: Plan,
     /// Whether the observer ended it.
     pub interrupted: bool,
 }
@@ -46,8 +48,15 @@ pub fn render(scene: &Scene, settings: &Settings, observer: &dyn Observer) -> Re
 }
 
 fn run(scene: &Scene, settings: &Settings, observer: &dyn Observer) -> Result<Outcome> {
+    let effects = effects::analyze(scene, settings);
+    let plan = integrator::plan::plan(scene, settings, &effects)?;
+    if let Some(complaint) = plan.complaint() {
+        observer.warn(&complaint);
+    }
+    let reduced = integrator::plan::without(scene, settings)?;
+    let (scene, settings) = reduced.as_ref().map_or((scene, settings), |(scene, settings)| (scene, settings));
     let mut settings = settings.clone();
-    settings.integrator = chosen(scene, &settings);
+    settings.integrator = plan.integrator;
     let start = Instant::now();
     let world = World::new(scene, &settings)?;
     let accel_build = start.elapsed().as_secs_f64();
@@ -122,7 +131,11 @@ fn run(scene: &Scene, settings: &Settings, observer: &dyn Observer) -> Result<Ou
         width: film.width(),
         height: film.height(),
         iterations: finished,
-        effects: BTreeMap::new(),
+        effects: effects
+            .findings
+            .iter()
+            .map(|f| (f.effect.id().to_owned(), f.verdict.name().to_owned()))
+            .collect(),
         seconds: Seconds {
             load: 0.0,
             accel_build,
@@ -152,22 +165,5 @@ fn run(scene: &Scene, settings: &Settings, observer: &dyn Observer) -> Result<Ou
         },
     };
     sizes.truncate(usize::try_from(finished).unwrap_or(usize::MAX));
-    Ok(Outcome { film, stats, sizes, interrupted })
-}
-
-/// What `auto` stands for: the least machinery that finds all of the scene's light.
-fn chosen(scene: &Scene, settings: &Settings) -> Integrator {
-    use crate::bsdf::Bsdf;
-    if settings.integrator != Integrator::Auto {
-        return settings.integrator;
-    }
-    let bsdfs: Vec<Bsdf> = scene.materials.iter().map(|m| m.bsdf(glam::DVec2::ZERO)).collect();
-    let glossy = |b: &Bsdf| b.glossy().is_some_and(|g| g.alpha_x.max(g.alpha_y) <= settings.hrr_alpha);
-    if bsdfs.iter().any(glossy) {
-        Integrator::LvcHrr
-    } else if bsdfs.iter().any(|b| b.is_delta() || b.glossy().is_some()) {
-        Integrator::Lvc
-    } else {
-        Integrator::Pt
-    }
+    Ok(Outcome { film, stats, sizes, plan, interrupted })
 }

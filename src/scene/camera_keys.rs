@@ -16,6 +16,7 @@ pub(super) struct CameraKeys {
     target: Option<(DVec3, At)>,
     up: Option<(DVec3, At)>,
     fov_y: f64,
+    aperture_radius: f64,
     focus_distance: Option<f64>,
 }
 
@@ -28,11 +29,12 @@ impl CameraKeys {
                 |node: &super::document::Node| Ok((node.vector(&format!("camera.{key}"))?, node.at.clone()));
             table.get(key).map(read).transpose()
         };
-        let keys = Self {
+        let mut keys = Self {
             origin: vector("origin")?,
             target: vector("target")?,
             up: vector("up")?,
             fov_y: table.get("fov_y").map_or(Ok(FOV_Y), |n| n.number("camera.fov_y"))?,
+            aperture_radius: 0.0,
             focus_distance: table
                 .get("focus_distance")
                 .map(|n| n.number("camera.focus_distance"))
@@ -54,9 +56,7 @@ impl CameraKeys {
                     .at
                     .error(format!("camera.aperture_radius is {radius}; it must not be negative")));
             }
-            if radius > 0.0 {
-                return Err(node.at.unsupported("camera.aperture_radius above 0 (depth of field)"));
-            }
+            keys.aperture_radius = radius;
         }
         match (&keys.origin, &keys.target) {
             (Some((_, at)), None) => Err(at.error("camera.origin is given, but not camera.target")),
@@ -83,7 +83,8 @@ impl CameraKeys {
             return Err(at.error(message));
         }
         let focus_distance = self.focus_distance.unwrap_or_else(|| view.length());
-        Ok(CameraSettings { origin, target, up, fov_y: self.fov_y, aperture_radius: 0.0, focus_distance })
+        let &Self { fov_y, aperture_radius, .. } = self;
+        Ok(CameraSettings { origin, target, up, fov_y, aperture_radius, focus_distance })
     }
 }
 

@@ -7,18 +7,20 @@ use crate::error::Result;
 use crate::material::{Material, Scattering};
 use crate::math::Spectrum;
 
-const TYPES: [&str; 4] = ["diffuse", "conductor", "dielectric", "mirror"];
-const EMISSION: [&str; 2] = ["emission", "two_sided_emission"];
+const TYPES: [&str; 5] = ["diffuse", "conductor", "dielectric", "mirror", "coated"];
+/// Keys of materials of every type.
+const COMMON: [&str; 3] = ["emission", "two_sided_emission", "opacity"];
 
 /// The table of one name.
 #[derive(Debug)]
 pub(super) struct MaterialKeys {
     name: String,
     at: At,
-    /// Without a `type`, only the emission changes.
+    /// Without a `type`, only emission and opacity change.
     scattering: Option<Scattering>,
     emission: Option<Spectrum>,
     two_sided_emission: Option<bool>,
+    opacity: Option<f64>,
 }
 
 impl MaterialKeys {
@@ -26,11 +28,11 @@ impl MaterialKeys {
         let name = &entry.key;
         let table = entry.node.table(&format!("[material.{name}]"))?;
         let scattering = table.get("type").map(|kind| scattering(name, table, kind)).transpose()?;
-        let needs_type = |e: &&Entry| scattering.is_none() && !EMISSION.contains(&e.key.as_str());
+        let needs_type = |e: &&Entry| scattering.is_none() && !COMMON.contains(&e.key.as_str());
         if let Some(e) = table.entries().iter().find(needs_type) {
             let message =
                 format!("'{}' in [material.{name}] needs a type beside it: {}", e.key, TYPES.join(", "));
-            let known = EMISSION.into_iter().chain(["type"]);
+            let known = COMMON.into_iter().chain(["type"]);
             return Err(e.at.error(message + &suggestion(&e.key, known)));
         }
         let what = |key: &str| format!("material.{name}.{key}");
@@ -43,6 +45,7 @@ impl MaterialKeys {
                 .get("two_sided_emission")
                 .map(|n| n.boolean(&what("two_sided_emission")))
                 .transpose()?,
+            opacity: table.get("opacity").map(|n| share(n, &what("opacity"))).transpose()?,
         })
     }
 
@@ -55,6 +58,7 @@ impl MaterialKeys {
                 *material = Material::new(self.name.clone(), scattering.clone());
             }
             material.emission = self.emission.unwrap_or(material.emission);
+            material.opacity = self.opacity.unwrap_or(material.opacity);
             material.two_sided_emission = self.two_sided_emission.unwrap_or(material.two_sided_emission);
         }
         if found {
@@ -68,7 +72,7 @@ impl MaterialKeys {
 fn scattering(name: &str, table: &Table, kind: &Node) -> Result<Scattering> {
     let what = |key: &str| format!("material.{name}.{key}");
     let only = |keys: &[&str]| {
-        let known: Vec<&str> = ["type"].iter().chain(&EMISSION).chain(keys).copied().collect();
+        let known: Vec<&str> = ["type"].iter().chain(&COMMON).chain(keys).copied().collect();
         table.only(&format!("[material.{name}]"), &known)
     };
     let need = |key: &str| {
@@ -111,12 +115,30 @@ fn scattering(name: &str, table: &Table, kind: &Node) -> Result<Scattering> {
             let reflectance = node.map_or(Ok(Spectrum::ONE), |n| n.color(&what("reflectance"), 1.0))?;
             Ok(Scattering::Mirror { reflectance })
         }
+        "coated" => {
+            only(&["albedo", "reflectance", "alpha"])?;
+            let node = table.get("reflectance");
+            let f0 = node.map_or(Ok(Spectrum::splat(0.04)), |n| n.color(&what("reflectance"), 1.0))?;
+            let albedo = need("albedo")?.color(&what("albedo"), 1.0)?;
+            let [alpha_x, alpha_y] = table.get("alpha").map_or(Ok([0.0; 2]), |n| alpha(n, &what("alpha")))?;
+            Ok(Scattering::Coated { albedo, map: None, f0, alpha_x, alpha_y })
+        }
         other => {
             let hint = suggestion(other, TYPES);
             let message =
                 format!("{} is \"{other}\"; it must be one of {}{hint}", what("type"), TYPES.join(", "));
             Err(kind.at.error(message))
         }
+    }
+}
+
+/// A number in 0..=1.
+fn share(node: &Node, what: &str) -> Result<f64> {
+    let x = node.number(what)?;
+    if (0.0..=1.0).contains(&x) {
+        Ok(x)
+    } else {
+        Err(node.at.error(format!("{what} is {x}; it must lie in 0..=1")))
     }
 }
 

@@ -7,9 +7,11 @@ use crate::camera::CameraSettings;
 use crate::error::{Error, Place, Result};
 use crate::film::FilmSettings;
 use crate::geometry::Mesh;
+use crate::light::LightSource;
 use crate::material::Material;
+use crate::math::Spectrum;
 use crate::settings::Settings;
-use document::{At, Table};
+use document::Table;
 use inputs::Inputs;
 use notes::Notes;
 use obj::Gathering;
@@ -19,6 +21,7 @@ use std::path::{Path, PathBuf};
 mod camera_keys;
 mod document;
 mod inputs;
+mod light_keys;
 mod material_keys;
 mod mtl;
 mod mtl_rules;
@@ -38,6 +41,8 @@ pub struct Scene {
     pub mesh: Mesh,
     /// The materials that [`Mesh::materials`] indexes.
     pub materials: Vec<Material>,
+    /// Lights beside emitting materials.
+    pub lights: Vec<LightSource>,
     /// The camera.
     pub camera: CameraSettings,
     /// The image.
@@ -56,7 +61,7 @@ impl Scene {
     ///
     /// `overrides` are dotted keys of the TOML file and their values, such as `("camera.fov_y", "30")` or
     /// `("material.mirror.alpha", "[1e-3, 1e-3]")`; they win over the file. A bare OBJ file gets a camera that sees all
-    /// of it, and its light from the materials' `Ke`.
+    /// of it, and its light from the materials' `Ke`, or else from a uniform white sky.
     ///
     /// Errors: [`Error::Scene`] with file and line for what cannot be read, [`Error::Usage`] for overrides,
     /// [`Error::Unsupported`] for what is understood but missing from hrr. Remarks go to [`Scene::warnings`].
@@ -102,13 +107,16 @@ impl Scene {
         for keys in &file.materials {
             keys.apply(&mut materials)?;
         }
-        if !mesh.materials.iter().any(|&m| materials[m as usize].emits()) {
+        let mut lights =
+            file.lights.iter().map(|keys| keys.load(folder, &mut inputs)).collect::<Result<Vec<_>>>()?;
+        if lights.is_empty() && !mesh.materials.iter().any(|&m| materials[m as usize].emits()) {
             if bare {
-                let message =
-                    "a uniform environment in place of lights; give a material of the MTL file a Ke";
-                return Err(At::Line(Place::file(path)).unsupported(message));
+                let message = "nothing emits light (no material has a Ke): it is lit by a uniform white sky";
+                notes.add("sky", &Place::file(path), message);
+                lights.push(LightSource::Environment { color: Spectrum::ONE, image: None });
+            } else {
+                notes.add("dark", &Place::file(path), "nothing emits light: the image will be black");
             }
-            notes.add("dark", &Place::file(path), "nothing emits light: the image will be black");
         }
         let aspect = f64::from(file.film.width) / f64::from(file.film.height);
         let camera = file.camera.settings(&mesh, aspect)?;
@@ -116,6 +124,7 @@ impl Scene {
             path: path.to_owned(),
             mesh,
             materials,
+            lights,
             camera,
             film: file.film,
             settings: file.settings,

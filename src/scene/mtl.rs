@@ -87,6 +87,8 @@ pub(super) struct MtlMaterial {
     pub(super) line: usize,
     /// Line of each key.
     lines: HashMap<&'static str, usize>,
+    /// What follows each map key.
+    maps: HashMap<&'static str, String>,
 }
 
 impl MtlMaterial {
@@ -101,6 +103,11 @@ impl MtlMaterial {
         let mut keys: Vec<_> = self.lines.keys().copied().filter(is_map).collect();
         keys.sort_by_key(|k| self.lines[k]);
         keys
+    }
+
+    /// What follows a map key.
+    pub(super) fn map(&self, key: &str) -> Option<&str> {
+        self.maps.get(key).map(String::as_str)
     }
 
     /// A number that the parser leaves as text.
@@ -149,6 +156,9 @@ impl Library {
             if kind != Kind::Ignored {
                 let value = check(kind, key, rest).map_err(|message| Error::scene(place, message))?;
                 head.lines.insert(key, index + 1);
+                if kind == Kind::Map {
+                    head.maps.insert(key, value.clone());
+                }
                 writeln!(plain, "{key} {value}").ok();
             }
         }

@@ -2,24 +2,31 @@
 //!
 //! MTL describes looks, not matter, and leaves gaps; the rules here are one reading of it.
 //! - `illum` 6 and 7 are glass, and so are 4 and 9 where something shines through (`d` < 1 or `Tr` > 0; `d` wins).
-//! - `Pm` >= 0.5 is a metal that reflects `Kd`, less is a diffuse surface. Without `Pm`, the stronger of `Kd` and
-//!   `Ks` stays: a diffuse surface, or a metal that reflects `Ks`. `illum` 0 and 1 have no `Ks` unless a roughness is
-//!   given.
+//! - `Kd` and `Ks` together are a diffuse base under a glossy coat that reflects `Ks` head on; `Kd` or `Ks` alone is a
+//!   diffuse surface or a metal. `Pm` is how much of a metal it is: a coat that reflects from 0.04 (none) to `Kd` (all)
+//!   over a base of (1 - `Pm`) `Kd`. `Pc` without these is a clear coat of reflectance 0.04 `Pc` and roughness `Pcr`.
+//!   `illum` 0 and 1 have no `Ks` unless a roughness is given.
+//! - `d` (or 1 - `Tr`, or `map_d`) of what is not glass is the probability that a surface is there at all.
 //! - Roughness: `hrr_alpha_x` and `hrr_alpha_y` as they are; else alpha = `Pr`^2, which `aniso` stretches
 //!   ([Burley 2012], with the aspect sqrt(1 - 0.9 aniso)); else smooth for glass and for `illum` 3, 5 and 7; else
 //!   alpha = sqrt(2 / (`Ns` + 2)), the Blinn-Phong lobe's equal; `anisor` turns the frame, 1 being a full turn.
 
 use super::mtl::{Library, MapReference, MtlMaterial};
 use super::notes::Notes;
-use super::textures::Textures;
+use super::textures::{Content, Textures};
 use crate::bsdf::Reflectance;
 use crate::error::{Error, Result};
-use crate::material::{Material, Scattering};
-use crate::math::{Spectrum, luminance};
+use crate::material::{Maps, Material, Scattering};
+use crate::math::Spectrum;
+use crate::texture::Texture;
 use std::f64::consts::TAU;
 
 /// Keys that have no effect yet unless they are 0.
-const UNUSED: [(&str, &str); 3] = [("Ps", "sheen"), ("Pc", "clear coat"), ("Pcr", "clear coat roughness")];
+const UNUSED: [(&str, &str); 1] = [("Ps", "sheen")];
+/// Reflectance, head on, of the usual coats and of plain matter: an index of refraction of 1.5.
+const DIELECTRIC_F0: f64 = 0.04;
+/// Maps that are followed, beside that of the diffuse reflectance.
+const FOLLOWED: [&str; 4] = ["map_Pr", "norm", "map_Ke", "map_d"];
 
 /// The material that stands for faces without one.
 pub(super) fn grey() -> Material {
@@ -46,26 +53,22 @@ pub(super) fn material(
     let roughness = roughness(library, m, illum, notes);
 
     let glass = matches!(illum, 6 | 7) || (matches!(illum, 4 | 9) && opacity < 1.0);
+    let maps = maps(library, m, textures, notes)?;
+    // A map of the roughness means the roughness itself where there is no number beside it.
+    let roughness = if maps.roughness.is_some() && m.number("Pr").is_none() && !exact(m) {
+        Some((1.0, 1.0))
+    } else {
+        roughness
+    };
     let scattering = if glass {
         dielectric(library, m, roughness, notes)?
     } else {
-        see_through(library, m, opacity, notes);
-        let metal = match metalness {
-            Some(pm) => pm >= 0.5,
-            None => ks != Spectrum::ZERO && luminance(ks) >= luminance(kd),
-        };
-        layers(library, m, metal, kd, ks, notes);
-        if metal {
-            let tint = if metalness.is_some() { kd } else { ks };
-            match roughness {
-                None => Scattering::Mirror { reflectance: tint },
-                Some((alpha_x, alpha_y)) => {
-                    Scattering::Conductor { reflectance: Reflectance::Schlick { f0: tint }, alpha_x, alpha_y }
-                }
-            }
-        } else {
-            diffuse(library, m, kd, textures, notes)?
+        let mut surface = Surface { kd, ks, roughness, map: None };
+        if kd != Spectrum::ZERO || ks == Spectrum::ZERO {
+            (surface.kd, surface.map) = diffuse(library, m, kd, textures, notes)?;
         }
+        see_through(library, m, opacity, notes);
+        surface.scattering(library, m, metalness, notes)
     };
 
     for (key, what) in UNUSED {
@@ -74,17 +77,118 @@ pub(super) fn material(
             notes.add(key, &library.place(m, key), message);
         }
     }
-    let uses_kd_map = matches!(scattering, Scattering::Diffuse { .. });
-    for key in m.maps().into_iter().filter(|&k| !(uses_kd_map && k == "map_Kd")) {
+    let uses_kd_map = scattering.albedo_map().is_some();
+    let unused = |k: &&str| !(FOLLOWED.contains(k) || uses_kd_map && *k == "map_Kd");
+    for key in m.maps().into_iter().filter(unused) {
         let message = format!("material '{}': {key} is not used yet", v.name);
         notes.add(key, &library.place(m, key), message);
     }
 
-    let emission = color(v.emissive);
+    // A writer that leaves Ke out, or black, means the picture itself.
+    let emission = match color(v.emissive) {
+        Spectrum::ZERO if maps.emission.is_some() => Spectrum::ONE,
+        emission => emission,
+    };
     let tangent_angle = m.number("anisor").unwrap_or(0.0) * TAU;
     let mut material = Material::new(v.name.clone(), scattering);
     (material.tangent_angle, material.emission) = (tangent_angle, emission);
+    if !glass {
+        material.opacity = opacity;
+    }
+    material.set_maps(maps);
     Ok(material)
+}
+
+/// Whether the roughness is given as it is.
+fn exact(m: &MtlMaterial) -> bool {
+    ["hrr_alpha_x", "hrr_alpha_y"].iter().any(|key| m.number(key).is_some())
+}
+
+/// Reads the maps that are followed, but for that of the diffuse reflectance.
+fn maps(library: &Library, m: &MtlMaterial, textures: &mut Textures<'_>, notes: &mut Notes) -> Result<Maps> {
+    let mut load = |key: &'static str, content: Content| texture(library, m, key, content, textures, notes);
+    Ok(Maps {
+        roughness: load("map_Pr", Content::Data)?,
+        normal: load("norm", Content::Data)?,
+        emission: load("map_Ke", Content::Colors)?,
+        opacity: load("map_d", Content::Data)?,
+    })
+}
+
+/// The texture of a map key, where it is given.
+fn texture(
+    library: &Library,
+    m: &MtlMaterial,
+    key: &'static str,
+    content: Content,
+    textures: &mut Textures<'_>,
+    notes: &mut Notes,
+) -> Result<Option<Texture>> {
+    let Some(text) = m.map(key) else { return Ok(None) };
+    let place = library.place(m, key);
+    let reference =
+        MapReference::parse(text).map_err(|e| Error::scene(place.clone(), format!("{key}: {e}")))?;
+    if !reference.unused.is_empty() {
+        let message =
+            format!("material '{}': {key}'s {} are not followed", m.values.name, reference.unused.join(", "));
+        notes.add("map options", &place, message);
+    }
+    textures.load(&library.file, &reference, content, &place).map(Some)
+}
+
+/// What a surface that is not glass is made of.
+struct Surface {
+    kd: Spectrum,
+    ks: Spectrum,
+    roughness: Option<(f64, f64)>,
+    /// Of `kd`.
+    map: Option<Texture>,
+}
+
+impl Surface {
+    fn scattering(
+        self,
+        library: &Library,
+        m: &MtlMaterial,
+        metalness: Option<f64>,
+        notes: &mut Notes,
+    ) -> Scattering {
+        let Self { kd, ks, roughness, map } = self;
+        let (alpha_x, alpha_y) = roughness.unwrap_or((0.0, 0.0));
+        let coat = m.number("Pc").unwrap_or(0.0).min(1.0);
+        if coat > 0.0 && (ks != Spectrum::ZERO || metalness.is_some_and(|pm| pm > 0.0)) {
+            let message = format!(
+                "material '{}': Pc (clear coat) over Ks or a metal is not supported yet; it is left out",
+                m.values.name
+            );
+            notes.add("Pc", &library.place(m, "Pc"), message);
+        }
+        match metalness.map(|pm| pm.min(1.0)) {
+            Some(pm) if pm >= 1.0 => reflector(kd, roughness),
+            Some(pm) if pm > 0.0 => {
+                let f0 = Spectrum::splat(DIELECTRIC_F0).lerp(kd, pm);
+                Scattering::Coated { albedo: kd * (1.0 - pm), map, f0, alpha_x, alpha_y }
+            }
+            _ if ks == Spectrum::ZERO && coat > 0.0 => {
+                let alpha = m.number("Pcr").unwrap_or(0.0).min(1.0).powi(2);
+                let f0 = Spectrum::splat(DIELECTRIC_F0 * coat);
+                Scattering::Coated { albedo: kd, map, f0, alpha_x: alpha, alpha_y: alpha }
+            }
+            _ if ks == Spectrum::ZERO => Scattering::Diffuse { albedo: kd, map },
+            _ if kd == Spectrum::ZERO => reflector(ks, roughness),
+            _ => Scattering::Coated { albedo: kd, map, f0: ks, alpha_x, alpha_y },
+        }
+    }
+}
+
+/// A metal, smooth where no roughness is given.
+fn reflector(tint: Spectrum, roughness: Option<(f64, f64)>) -> Scattering {
+    match roughness {
+        None => Scattering::Mirror { reflectance: tint },
+        Some((alpha_x, alpha_y)) => {
+            Scattering::Conductor { reflectance: Reflectance::Schlick { f0: tint }, alpha_x, alpha_y }
+        }
+    }
 }
 
 /// A colour brought into 0..=1, with a remark where that changes it.
@@ -153,69 +257,32 @@ fn dielectric(
     Ok(Scattering::Dielectric { ior, alpha_x, alpha_y })
 }
 
-/// Remarks on the layer that is left out of a material that has two.
-fn layers(library: &Library, m: &MtlMaterial, metal: bool, kd: Spectrum, ks: Spectrum, notes: &mut Notes) {
-    let name = &m.values.name;
-    if let Some(pm) = m.number("Pm") {
-        if pm > 0.0 && pm < 1.0 {
-            let taken = if metal { "all metal" } else { "no metal at all" };
-            let message = format!("material '{name}' is part metal (Pm {pm}); it is taken as {taken}");
-            notes.add("part metal", &library.place(m, "Pm"), message);
-        }
-        if metal {
-            return;
-        }
-    }
-    if kd != Spectrum::ZERO && ks != Spectrum::ZERO {
-        let (kept, dropped) = if metal { ("Ks", "Kd") } else { ("Kd", "Ks") };
-        let message = format!(
-            "material '{name}' has Kd and Ks; a coat over a base is not supported yet: {kept} is kept and {dropped} \
-             left out"
-        );
-        notes.add("coat and base", &library.place(m, dropped), message);
-    }
-}
-
 /// Remarks on what would let light through a surface that is not glass.
 fn see_through(library: &Library, m: &MtlMaterial, opacity: f64, notes: &mut Notes) {
     let name = &m.values.name;
-    if opacity < 1.0 {
+    if opacity == 0.0 && m.map("map_d").is_none() {
         let key = if m.values.dissolve.is_some() { "d" } else { "Tr" };
-        let message = format!(
-            "material '{name}' is {:.0} % transparent ({key}), which is not supported yet: it is taken as opaque; \
-             illum 7 makes it glass",
-            100.0 * (1.0 - opacity)
-        );
+        let message = format!("material '{name}' is fully transparent ({key}): nothing of it will be seen");
         notes.add("opacity", &library.place(m, key), message);
-    } else if m.number("Pr").is_some() && m.color("Tf").is_some_and(|tf| tf != Spectrum::ZERO) {
+    } else if opacity >= 1.0
+        && m.number("Pr").is_some()
+        && m.color("Tf").is_some_and(|tf| tf != Spectrum::ZERO)
+    {
         let message = format!("material '{name}': Tf has no effect without illum 7, which makes it glass");
         notes.add("tf without glass", &library.place(m, "Tf"), message);
     }
 }
 
+/// The diffuse reflectance: a colour, and the map that it is multiplied by.
 fn diffuse(
     library: &Library,
     m: &MtlMaterial,
     kd: Spectrum,
     textures: &mut Textures<'_>,
     notes: &mut Notes,
-) -> Result<Scattering> {
-    let Some(text) = &m.values.diffuse_texture else {
-        return Ok(Scattering::Diffuse { albedo: kd, map: None });
-    };
-    let place = library.place(m, "map_Kd");
-    let reference =
-        MapReference::parse(text).map_err(|e| Error::scene(place.clone(), format!("map_Kd: {e}")))?;
-    if !reference.unused.is_empty() {
-        let message = format!(
-            "material '{}': map_Kd's {} are not followed",
-            m.values.name,
-            reference.unused.join(", ")
-        );
-        notes.add("map options", &place, message);
-    }
+) -> Result<(Spectrum, Option<Texture>)> {
+    let map = texture(library, m, "map_Kd", Content::Colors, textures, notes)?;
     // A writer that leaves Kd out, or black, means the picture itself.
-    let albedo = if kd == Spectrum::ZERO { Spectrum::ONE } else { kd };
-    let map = textures.load(&library.file, &reference, &place)?;
-    Ok(Scattering::Diffuse { albedo, map: Some(map) })
+    let albedo = if map.is_some() && kd == Spectrum::ZERO { Spectrum::ONE } else { kd };
+    Ok((albedo, map))
 }

@@ -2,12 +2,12 @@
 
 use super::camera_keys::CameraKeys;
 use super::document::{At, Node, Table};
+use super::light_keys::{self, LightKeys};
 use super::material_keys::MaterialKeys;
 use crate::error::Result;
 use crate::film::{FilmSettings, Filter};
 use crate::settings::{SettingError, Settings};
 
-const LIGHT_TYPES: [&str; 4] = ["point", "spot", "directional", "environment"];
 /// Pixels across or down.
 const MAX_PIXELS: u32 = 65536;
 
@@ -24,6 +24,8 @@ pub(super) struct SettingsFile {
     pub(super) settings: Settings,
     /// Materials that take the place of the MTL's.
     pub(super) materials: Vec<MaterialKeys>,
+    /// Lights beside emitting materials.
+    pub(super) lights: Vec<LightKeys>,
 }
 
 impl SettingsFile {
@@ -33,9 +35,6 @@ impl SettingsFile {
         let empty = Table::default();
         let section =
             |name: &str| document.get(name).map_or(Ok(&empty), |node| node.table(&format!("[{name}]")));
-        if let Some(lights) = document.get("light") {
-            refuse_lights(lights)?;
-        }
         let materials =
             section("material")?.entries().iter().map(MaterialKeys::read).collect::<Result<_>>()?;
         Ok(Self {
@@ -44,6 +43,7 @@ impl SettingsFile {
             film: film(section("film")?)?,
             settings: settings(section("render")?)?,
             materials,
+            lights: document.get("light").map_or(Ok(Vec::new()), light_keys::read)?,
         })
     }
 }
@@ -87,20 +87,4 @@ fn settings(table: &Table) -> Result<Settings> {
         })?;
     }
     Ok(settings)
-}
-
-/// Only emitting triangles give light so far: the first entry is the error.
-fn refuse_lights(lights: &Node) -> Result<()> {
-    let Some(light) = lights.array("[[light]]")?.first() else { return Ok(()) };
-    let table = light.table("[[light]]")?;
-    let Some(kind) = table.get("type") else {
-        return Err(light.at.error(format!("[[light]] needs a type: {}", LIGHT_TYPES.join(", "))));
-    };
-    let name = kind.string("light.type")?;
-    if LIGHT_TYPES.contains(&name) {
-        return Err(kind.at.unsupported(format!("{name} lights; give a material an emission instead")));
-    }
-    let hint = super::notes::suggestion(name, LIGHT_TYPES);
-    let known = LIGHT_TYPES.join(", ");
-    Err(kind.at.error(format!("light.type is \"{name}\"; it must be one of {known}{hint}")))
 }

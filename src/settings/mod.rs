@@ -2,9 +2,11 @@
 //! of the program and the setters of the C interface are all fed from [`TABLE`].
 
 mod choices;
+mod effects;
 mod table;
 
 pub use choices::{Backend, Heuristic, Integrator, Switch};
+pub use effects::{Effect, EffectSet};
 pub use table::TABLE;
 
 use crate::error::{Error, Place};
@@ -14,6 +16,10 @@ use crate::error::{Error, Place};
 pub struct Settings {
     /// Transport algorithm.
     pub integrator: Integrator,
+    /// Effects whose machinery runs though the scene does not call for it.
+    pub with: EffectSet,
+    /// Effects that are left out.
+    pub without: EffectSet,
     /// Longest path, in segments: 1 = emitters seen directly, 2 = direct light.
     pub max_depth: u32,
     /// Ray query backend.
@@ -64,6 +70,8 @@ impl Default for Settings {
     fn default() -> Self {
         Self {
             integrator: Integrator::Auto,
+            with: EffectSet::default(),
+            without: EffectSet::default(),
             max_depth: 24,
             visibility: Backend::BEST,
             iterations: 64,
@@ -126,6 +134,13 @@ pub enum Kind {
         /// Takes the name of an index below `names.len()`.
         set: fn(&mut Settings, usize),
     },
+    /// Names of effects with commas between them.
+    Effects {
+        /// Reads the field.
+        get: fn(&Settings) -> EffectSet,
+        /// Writes the field.
+        set: fn(&mut Settings, EffectSet),
+    },
 }
 
 /// One row of [`TABLE`].
@@ -184,12 +199,13 @@ impl Kind {
             Self::Integer { min, max, .. } => format!("a whole number from {min} to {max}"),
             Self::Real { min, max, .. } => format!("a number from {min:?} to {max:?}"),
             Self::Choice { names, .. } => format!("one of {}", names.join(", ")),
+            Self::Effects { .. } => format!("some of {}", Effect::ALL.map(Effect::id).join(", ")),
         }
     }
 
     /// Whether values are words (quoted in TOML) and not numbers.
     pub fn is_text(&self) -> bool {
-        matches!(self, Self::Choice { .. })
+        matches!(self, Self::Choice { .. } | Self::Effects { .. })
     }
 }
 
@@ -229,6 +245,7 @@ impl Setting {
                 let number = value.parse().ok().filter(|x| (min..=max).contains(x)).ok_or_else(refuse)?;
                 set(settings, number);
             }
+            Kind::Effects { set, .. } => set(settings, value.parse()?),
             Kind::Choice { names, planned, set, .. } => match names.iter().position(|n| *n == value) {
                 Some(index) => set(settings, index),
                 None if planned.contains(&value) => {
@@ -256,6 +273,9 @@ impl Setting {
             Kind::Integer { get, .. } => Some(get(settings).to_string()),
             Kind::Real { get, .. } => get(settings).map(|x| format!("{x:?}")),
             Kind::Choice { names, get, .. } => Some(names[get(settings)].to_owned()),
+            Kind::Effects { get, .. } => {
+                Some(get(settings)).filter(|set| !set.is_empty()).map(|set| set.to_string())
+            }
         }
     }
 }

@@ -27,6 +27,24 @@ pub const TABLE: &[Setting] = &[
               Russian roulette at glossy eye vertices. auto: chosen from what the scene contains.",
     },
     Setting {
+        name: "with",
+        kind: Kind::Effects { get: |s| s.with, set: |s, v| s.with = v },
+        default: "",
+        value_name: "EFFECTS",
+        heading: TRANSPORT,
+        help: "Effects whose machinery runs (auto) though the scene does not call for it",
+        doc: "Names with commas between them, such as sds,caustics; 'hrr effects' lists them.",
+    },
+    Setting {
+        name: "without",
+        kind: Kind::Effects { get: |s| s.without, set: |s, v| s.without = v },
+        default: "",
+        value_name: "EFFECTS",
+        heading: TRANSPORT,
+        help: "Effects that are left out",
+        doc: "Names with commas between them. An image without what the scene calls for is marked as biased.",
+    },
+    Setting {
         name: "max_depth",
         kind: Kind::Integer {
             min: 1,

@@ -2,15 +2,14 @@
 
 use super::walk::{Rules, Start, Walk};
 use super::{Total, World};
-use crate::light::{EmissionGuide, EmitterPoint};
+use crate::light::{EmissionGuide, LightPoint};
 use crate::sampler::{Purpose, Sampler};
 use crate::visibility::offset;
-use glam::DVec3;
+use glam::DVec2;
 
-/// Emits from a point of an emitter, chosen by power and area, into a direction, chosen by the cosine or by `guide`, and
-/// follows it
-/// to the first surface. `m_0` says how often the eye subpath that hits the emitter tries (0 or 1). `None` when
-/// nothing emits or nothing is met.
+/// Emits from a point of a light, chosen by power and area, along a ray, chosen by the cosine (from all of the scene's
+/// outline, where light is distant) or by `guide`, and follows it to the first surface. `m_0` says how often the eye
+/// subpath that hits the emitter tries (0 or 1). `None` when nothing emits or nothing is met.
 pub fn emit(
     world: &World<'_>,
     rules: &Rules,
@@ -18,33 +17,42 @@ pub fn emit(
     sampler: &Sampler,
     m_0: f64,
 ) -> Option<Walk> {
-    let (emitter, direction) = start(world, guide, sampler)?;
-    let cos = emitter.point.ng.dot(direction).abs();
-    let pdf_w = guide.map_or_else(|| emitter.pdf_w(direction), |guide| guide.pdf_w(&emitter, direction));
-    if !(pdf_w > 0.0) {
+    let (light, u) = start(world, guide, sampler)?;
+    let surroundings = world.lights.surroundings();
+    let emission = light.emit(surroundings, u)?;
+    let pdf = match guide {
+        None => light.emission_pdf(surroundings, emission.direction),
+        // Of distant light the place is meant, and the ray's start is on the ray.
+        Some(guide) => guide.pdf(&light, emission.direction, emission.origin),
+    };
+    if !(pdf > 0.0) {
         return None;
     }
+    let m_0 = if light.is_delta() { 0.0 } else { m_0 };
     let start = Start {
-        ray: offset::leave(&emitter.point, direction),
-        origin: emitter.point.position,
-        direction,
-        pdf_w,
-        cos,
-        total: Total::known(rules.heuristic.raise(m_0 / emitter.pdf_a)),
+        ray: match &light {
+            LightPoint::Surface(emitter) => offset::leave(&emitter.point, emission.direction),
+            _ => offset::from_free_point(emission.origin, emission.direction),
+        },
+        origin: emission.origin,
+        direction: emission.direction,
+        pdf_w: pdf,
+        cos: emission.cos,
+        total: Total::known(rules.heuristic.raise(m_0 / light.pdf())),
+        distant: matches!(light, LightPoint::Distant(_)),
     };
-    let throughput = emitter.emission * (cos / (emitter.pdf_a * pdf_w));
+    let throughput = emission.radiance * (emission.cos / (light.pdf() * pdf));
     Walk::follow(world, rules, &start, throughput)
 }
 
-/// Where and in which direction a light subpath starts; `None` when nothing emits.
+/// The light that a subpath starts from, and the point of the unit square that stands for the way it takes; `None`
+/// when nothing emits.
 pub fn start(
     world: &World<'_>,
     guide: Option<&EmissionGuide>,
     sampler: &Sampler,
-) -> Option<(EmitterPoint, DVec3)> {
-    let emitter =
-        world.lights.sample_point(sampler.u1(0, Purpose::LightPick), sampler.u2(0, Purpose::LightPoint))?;
+) -> Option<(LightPoint, DVec2)> {
+    let light = world.lights.sample(sampler.u1(0, Purpose::LightPick), sampler.u2(0, Purpose::LightPoint))?;
     let u = sampler.u2(0, Purpose::LightDirection);
-    let direction = emitter.sample_direction(guide.map_or(u, |guide| guide.warp(&emitter, u)))?;
-    Some((emitter, direction))
+    Some((light, guide.map_or(u, |guide| guide.warp(&light, u))))
 }

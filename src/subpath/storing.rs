@@ -47,8 +47,7 @@ impl Storing {
     /// What a surface is to the vertex that it throws light on.
     #[inline]
     pub fn origin(&self, bsdf: &Bsdf) -> Origin {
-        let narrow =
-            bsdf.is_delta() || bsdf.glossy().is_some_and(|g| g.alpha_x.max(g.alpha_y) <= self.max_alpha);
+        let narrow = bsdf.narrowest().is_some_and(|alpha| alpha <= self.max_alpha);
         if narrow { Origin::Narrow } else { Origin::Broad }
     }
 

@@ -2,7 +2,7 @@
 
 use super::World;
 use crate::bsdf::{Bsdf, Transport};
-use crate::geometry::{Shading, SurfacePoint};
+use crate::geometry::SurfacePoint;
 use crate::math::{Frame, Spectrum};
 use crate::sampler::{Purpose, Sampler};
 use glam::DVec3;
@@ -43,14 +43,9 @@ impl Vertex {
     #[inline(always)]
     pub fn new(world: &World<'_>, point: SurfacePoint, wo: DVec3) -> Self {
         let material = &world.scene.materials[world.scene.mesh.materials[point.triangle as usize] as usize];
-        let Shading { mut frame, uv } = point.shading(&world.scene.mesh);
-        if material.tangent_angle != 0.0 {
-            let (sin, cos) = material.tangent_angle.sin_cos();
-            let (x, y) = (frame.x, frame.y);
-            frame.x = x * cos + y * sin;
-            frame.y = y * cos - x * sin;
-        }
-        Self { point, wo, bsdf: material.bsdf(uv), frame, wo_local: frame.to_local(wo) }
+        let shading = point.shading(&world.scene.mesh);
+        let frame = if material.bends_frame() { material.frame(&shading, point.ng) } else { shading.frame };
+        Self { point, wo, bsdf: material.bsdf(shading.uv), frame, wo_local: frame.to_local(wo) }
     }
 
     /// |cos| between the geometric normal and a unit direction.

@@ -2,6 +2,7 @@
 
 use super::{Origin, Scattered, Storing, Total, Vertex, World};
 use crate::bsdf::Transport;
+use crate::geometry::SurfacePoint;
 use crate::math::Spectrum;
 use crate::mis::{Heuristic, Side};
 use crate::sampler::Sampler;
@@ -56,12 +57,36 @@ pub struct Start {
     pub cos: f64,
     /// [`Heuristic::total`] at the origin.
     pub total: Total,
+    /// Whether the segment comes in from a distant light: `pdf_w` is then a density per area across it, 1/m^2.
+    pub distant: bool,
+}
+
+/// A segment that a subpath goes on along.
+#[derive(Debug, Clone, Copy)]
+pub struct Segment {
+    /// Where it starts.
+    pub start: Start,
+    /// [`Walk::throughput`] at its end.
+    pub throughput: Spectrum,
+    /// Whether its direction comes from a delta lobe.
+    pub delta: bool,
 }
 
 impl Walk {
     /// Follows a segment to the surface it meets.
     pub fn follow(world: &World<'_>, rules: &Rules, start: &Start, throughput: Spectrum) -> Option<Self> {
         let point = world.intersect(&start.ray, start.origin, start.direction)?;
+        Self::arrive(world, rules, start, throughput, point)
+    }
+
+    /// Arrives at the surface that a segment meets.
+    pub fn arrive(
+        world: &World<'_>,
+        rules: &Rules,
+        start: &Start,
+        throughput: Spectrum,
+        point: SurfacePoint,
+    ) -> Option<Self> {
         let wo = -start.direction;
         let cos = point.ng.dot(wo).abs();
         let distance2 = (point.position - start.origin).length_squared();
@@ -71,7 +96,8 @@ impl Walk {
         let vertex = Vertex::new(world, point, wo);
         let Rules { heuristic, storing, .. } = rules;
         let total = start.total.given(*heuristic, storing, storing.origin(&vertex.bsdf));
-        let side = heuristic.arrive(start.pdf_w, cos, start.cos, distance2, total);
+        let spread = if start.distant { 1.0 } else { distance2 };
+        let side = heuristic.arrive(start.pdf_w, cos, start.cos, spread, total);
         let as_lamp = start.total.given(*heuristic, storing, Origin::Lamp);
         Some(Self {
             vertex,
@@ -80,7 +106,7 @@ impl Walk {
             b_as_lamp: if as_lamp == total {
                 side.b
             } else {
-                heuristic.arrive(start.pdf_w, cos, start.cos, distance2, as_lamp).b
+                heuristic.arrive(start.pdf_w, cos, start.cos, spread, as_lamp).b
             },
             distance: distance2.sqrt(),
             depth: 1,
@@ -89,14 +115,13 @@ impl Walk {
         })
     }
 
-    /// Scatters at the vertex and goes on to the next. `total` gives [`Start::total`] for the way the path goes on.
-    pub fn next(
+    /// Scatters at the vertex. `total` gives [`Start::total`] for the way the path goes on.
+    pub fn scatter(
         &self,
-        world: &World<'_>,
         rules: &Rules,
         sampler: &Sampler,
         total: impl FnOnce(&Scattered) -> Total,
-    ) -> Option<Self> {
+    ) -> Option<Segment> {
         let s = self.vertex.sample(rules.transport, sampler, self.depth)?;
         let start = Start {
             ray: offset::leave(&self.vertex.point, s.wi),
@@ -105,13 +130,38 @@ impl Walk {
             pdf_w: s.pdf,
             cos: self.vertex.cos_ng(s.wi),
             total: total(&s),
+            distant: false,
         };
+        Some(Segment { start, throughput: self.throughput * s.weight, delta: s.delta })
+    }
+
+    /// Goes on along a segment that ends at `point`.
+    pub fn go_on(
+        &self,
+        world: &World<'_>,
+        rules: &Rules,
+        segment: &Segment,
+        point: SurfacePoint,
+    ) -> Option<Self> {
         Some(Self {
             depth: self.depth + 1,
-            after_delta: s.delta,
+            after_delta: segment.delta,
             origins: [rules.storing.origin(&self.vertex.bsdf), self.origins[0]],
-            ..Self::follow(world, rules, &start, self.throughput * s.weight)?
+            ..Self::arrive(world, rules, &segment.start, segment.throughput, point)?
         })
+    }
+
+    /// Scatters at the vertex and goes on to the next; see [`Walk::scatter`].
+    pub fn next(
+        &self,
+        world: &World<'_>,
+        rules: &Rules,
+        sampler: &Sampler,
+        total: impl FnOnce(&Scattered) -> Total,
+    ) -> Option<Self> {
+        let segment = self.scatter(rules, sampler, total)?;
+        let Start { ray, origin, direction, .. } = &segment.start;
+        self.go_on(world, rules, &segment, world.intersect(ray, *origin, *direction)?)
     }
 
     /// Offset from the vertex back to the previous one.

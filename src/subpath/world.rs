@@ -7,14 +7,14 @@ use crate::geometry::SurfacePoint;
 use crate::light::Lights;
 use crate::scene::Scene;
 use crate::settings::Settings;
-use crate::visibility::{self, Ray, Visibility};
+use crate::visibility::{self, Cutouts, Ray, Visibility};
 use glam::{DVec2, DVec3};
 
 /// A scene with its emitters, camera and ray queries. Shared by all threads.
 pub struct World<'a> {
     /// Triangles and materials.
     pub scene: &'a Scene,
-    /// Emitting triangles.
+    /// Emitting triangles and other lights.
     pub lights: Lights,
     /// The camera.
     pub camera: Camera,
@@ -31,15 +31,22 @@ impl<'a> World<'a> {
         scene.mesh.validate()?;
         Ok(Self {
             scene,
-            lights: Lights::new(&scene.mesh, &scene.materials),
+            lights: Lights::new(&scene.mesh, &scene.materials, &scene.lights),
             camera: Camera::new(&scene.camera, (scene.film.width, scene.film.height), scene.mesh.origin)?,
-            visibility: visibility::build(settings.visibility, &scene.mesh, settings.threads)?,
+            visibility: visibility::build_with_cutouts(
+                settings.visibility,
+                &scene.mesh,
+                Cutouts::new(&scene.mesh, &scene.materials),
+                settings.threads,
+            )?,
         })
     }
 
-    /// The scattering model of a triangle, but for its texture.
-    pub fn bsdf_of(&self, triangle: u32) -> Bsdf {
-        self.scene.materials[self.scene.mesh.materials[triangle as usize] as usize].bsdf(DVec2::ZERO)
+    /// The scattering model at a surface point.
+    pub fn bsdf_at(&self, point: &SurfacePoint) -> Bsdf {
+        let mesh = &self.scene.mesh;
+        let material = &self.scene.materials[mesh.materials[point.triangle as usize] as usize];
+        material.bsdf(if material.is_constant() { DVec2::ZERO } else { point.uv(mesh) })
     }
 
     /// The surface point that a ray meets first. `origin` and unit `direction` are the ray in full precision, before

@@ -10,7 +10,7 @@
 // One of the crate's two doors to C.
 #![allow(unsafe_code)]
 
-use super::{Hit, Ray, Visibility};
+use super::{Cutouts, Hit, Ray, Visibility, cutouts};
 use crate::error::{Error, Result};
 use crate::geometry::Mesh;
 use embree4_sys as sys;
@@ -35,18 +35,40 @@ struct Triangles {
     /// One more than there are: Embree reads 16 bytes at a time.
     positions: Vec<Vec3>,
     corners: Vec<[u32; 3]>,
+    cutouts: Option<Cutouts>,
+}
+
+/// What [`confirm`] is told of a query, behind what Embree itself wants to know.
+#[repr(C)]
+struct Context {
+    base: sys::RTCRayQueryContext,
+    /// Of the ray as it was asked, for [`Cutouts`].
+    key: u64,
+}
+
+impl Context {
+    fn new(ray: &Ray) -> Self {
+        // SAFETY: all fields are numbers. All bits set is what `rtcInitRayQueryContext` makes of instance numbers: there
+        // are no instances.
+        let base = unsafe {
+            let mut base = mem::MaybeUninit::<sys::RTCRayQueryContext>::uninit();
+            base.as_mut_ptr().write_bytes(0xff, 1);
+            base.assume_init()
+        };
+        Self { base, key: cutouts::key(ray) }
+    }
 }
 
 impl Embree {
     /// Builds the acceleration structure with up to `threads` threads (0: all). The mesh is copied.
-    pub fn new(mesh: &Mesh, threads: usize) -> Result<Self> {
+    pub fn new(mesh: &Mesh, cutouts: Option<Cutouts>, threads: usize) -> Result<Self> {
         mesh.validate()?;
         let scale =
             inverse_power(mesh.positions.iter().fold(0.0, |size: f32, p| size.max(p.abs().max_element())));
         let mut positions = Vec::with_capacity(mesh.positions.len() + 1);
         positions.extend(mesh.positions.iter().map(|&p| p * scale));
         positions.push(Vec3::ZERO);
-        let triangles = Box::new(Triangles { positions, corners: mesh.triangles.clone() });
+        let triangles = Box::new(Triangles { positions, corners: mesh.triangles.clone(), cutouts });
         let device = Device::new(threads)?;
         let scene = Scene::new(&device)?;
         if !triangles.corners.is_empty() {
@@ -136,6 +158,10 @@ impl Visibility for Embree {
         let mut arguments: sys::RTCIntersectArguments = unsafe { mem::zeroed() };
         arguments.flags = sys::RTC_RAY_QUERY_FLAG_INCOHERENT;
         arguments.feature_mask = sys::RTC_FEATURE_FLAG_ALL;
+        let mut context = self.triangles.cutouts.is_some().then(|| Context::new(ray));
+        if let Some(context) = &mut context {
+            arguments.context = &raw mut context.base;
+        }
         loop {
             // SAFETY: the scene is committed and never changed again, so any thread may ask; `query` and `arguments`
             // have the layout of the headers, which the library understands (`Device::new` compares versions).
@@ -161,6 +187,10 @@ impl Visibility for Embree {
         let mut arguments: sys::RTCOccludedArguments = unsafe { mem::zeroed() };
         arguments.flags = sys::RTC_RAY_QUERY_FLAG_INCOHERENT;
         arguments.feature_mask = sys::RTC_FEATURE_FLAG_ALL;
+        let mut context = self.triangles.cutouts.is_some().then(|| Context::new(ray));
+        if let Some(context) = &mut context {
+            arguments.context = &raw mut context.base;
+        }
         // SAFETY: as in `intersect`.
         unsafe { sys::rtcOccluded1(self.scene.0, (&raw mut query).cast(), &mut arguments) };
         // A hit is told by a distance of -inf.
@@ -185,10 +215,12 @@ impl Triangles {
     }
 }
 
-/// Embree's question whether an obstacle that it found for a shadow ray counts.
+/// Embree's question whether an obstacle that it found counts: for shadow rays, and for all rays where there are
+/// [`Cutouts`].
 ///
 /// # Safety
-/// To be called by Embree only, for a geometry whose user data is a live [`Triangles`].
+/// To be called by Embree only, for a geometry whose user data is a live [`Triangles`]; where that has cutouts, the query's
+/// context is a [`Context`].
 unsafe extern "C" fn confirm(arguments: *const sys::RTCFilterFunctionNArguments) {
     // SAFETY: Embree passes a valid pointer for the time of the call.
     let arguments = unsafe { &*arguments };
@@ -196,11 +228,22 @@ unsafe extern "C" fn confirm(arguments: *const sys::RTCFilterFunctionNArguments)
     // SAFETY: set by `Geometry::new` to what outlives the scene; only ever read.
     let triangles = unsafe { &*arguments.geometryUserPtr.cast::<Triangles>() };
     // SAFETY: for one ray the layouts are those of `RTCRay` and `RTCHit`; nothing is assumed of their alignment.
-    let (ray, triangle) = unsafe {
+    let (ray, triangle, u, v) = unsafe {
         let hit = arguments.hit.cast::<sys::RTCHit>();
-        (arguments.ray.cast::<RawRay>().read_unaligned(), ptr::addr_of!((*hit).primID).read_unaligned())
+        (
+            arguments.ray.cast::<RawRay>().read_unaligned(),
+            ptr::addr_of!((*hit).primID).read_unaligned(),
+            ptr::addr_of!((*hit).u).read_unaligned(),
+            ptr::addr_of!((*hit).v).read_unaligned(),
+        )
     };
-    if !triangles.meets(triangle, &ray) {
+    let counts = triangles.meets(triangle, &ray)
+        && triangles.cutouts.as_ref().is_none_or(|cutouts| {
+            // SAFETY: with cutouts, every query has a `Context` (`intersect`, `occluded`), alive during the query.
+            let key = unsafe { (*arguments.context.cast::<Context>()).key };
+            cutouts.stops(key, triangle, u.into(), v.into())
+        });
+    if !counts {
         // SAFETY: one flag for the one ray; 0 rejects.
         unsafe { *arguments.valid = 0 };
     }
@@ -271,6 +314,9 @@ impl Geometry {
         unsafe {
             sys::rtcSetGeometryUserData(geometry.0, ptr::from_ref(triangles).cast_mut().cast());
             sys::rtcSetGeometryOccludedFilterFunction(geometry.0, Some(confirm));
+            if triangles.cutouts.is_some() {
+                sys::rtcSetGeometryIntersectFilterFunction(geometry.0, Some(confirm));
+            }
             sys::rtcCommitGeometry(geometry.0);
         }
         device.check("reading the triangles")?;
@@ -389,7 +435,7 @@ mod tests {
         for scale in [1e-30, 1e-12, 1e12, 1e30] {
             let positions = [Vec3::ZERO, Vec3::X, Vec3::Y].map(|p| p * scale).to_vec();
             let mesh = Mesh { positions, triangles: vec![[0, 1, 2]], materials: vec![0], ..Mesh::default() };
-            let embree = Embree::new(&mesh, 1).unwrap();
+            let embree = Embree::new(&mesh, None, 1).unwrap();
             for length in [scale, 1.0] {
                 let origin = Vec3::new(0.25, 0.5, 4.0) * scale;
                 let ray = Ray { origin, direction: -Vec3::Z * length, t_min: 0.0, t_max: f32::INFINITY };

@@ -6,12 +6,15 @@ use crate::settings::Backend;
 use glam::Vec3;
 
 pub mod brute;
+pub mod cutouts;
 mod bvh4;
 #[cfg(feature = "embree")]
 pub mod embree;
 pub mod obvhs;
 pub mod offset;
 mod triangle;
+
+pub use cutouts::Cutouts;
 
 /// A ray in the mesh's coordinates. `direction` need not be normalised; hits lie in `t_min < t < t_max`.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -54,14 +57,27 @@ pub trait Visibility: Send + Sync {
 /// [`Error::Usage`](crate::Error::Usage) when the backend is not part of this build, [`Error::Input`](crate::Error::Input) for an invalid mesh, and what the
 /// library below reports.
 pub fn build(backend: Backend, mesh: &Mesh, threads: usize) -> Result<Box<dyn Visibility>> {
+    build_with_cutouts(backend, mesh, None, threads)
+}
+
+/// As [`build`], over surfaces of which `cutouts` says where they stop rays.
+///
+/// # Errors
+/// As [`build`].
+pub fn build_with_cutouts(
+    backend: Backend,
+    mesh: &Mesh,
+    cutouts: Option<Cutouts>,
+    threads: usize,
+) -> Result<Box<dyn Visibility>> {
     match backend {
         #[cfg(feature = "embree")]
-        Backend::Embree => Ok(Box::new(embree::Embree::new(mesh, threads)?)),
+        Backend::Embree => Ok(Box::new(embree::Embree::new(mesh, cutouts, threads)?)),
         #[cfg(not(feature = "embree"))]
         Backend::Embree => {
             Err(crate::Error::Usage("this hrr was built without Embree (cargo feature 'embree')".into()))
         }
-        Backend::Obvhs => Ok(Box::new(obvhs::Obvhs::new(mesh, threads)?)),
-        Backend::Brute => Ok(Box::new(brute::Brute::new(mesh)?)),
+        Backend::Obvhs => Ok(Box::new(obvhs::Obvhs::new(mesh, cutouts, threads)?)),
+        Backend::Brute => Ok(Box::new(brute::Brute::new(mesh, cutouts)?)),
     }
 }

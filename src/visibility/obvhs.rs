@@ -2,7 +2,7 @@
 
 use super::bvh4::Bvh4;
 use super::triangle::{Shear, hit};
-use super::{Hit, Ray, Visibility};
+use super::{Cutouts, Hit, Ray, Visibility, cutouts};
 use crate::error::{Error, Result};
 use crate::geometry::Mesh;
 use glam::{Vec3, Vec3A};
@@ -17,6 +17,7 @@ pub struct Obvhs {
     tree: Bvh4,
     /// In the order of the tree's leaves.
     triangles: Vec<Triangle>,
+    cutouts: Option<Cutouts>,
 }
 
 #[derive(Debug, Clone, Copy)]
@@ -33,14 +34,14 @@ impl Boundable for Triangle {
 
 impl Obvhs {
     /// Builds the tree with up to `threads` threads (0: all). The mesh is copied.
-    pub fn new(mesh: &Mesh, threads: usize) -> Result<Self> {
+    pub fn new(mesh: &Mesh, cutouts: Option<Cutouts>, threads: usize) -> Result<Self> {
         mesh.validate()?;
         let unordered: Vec<Triangle> = (0..)
             .zip(&mesh.triangles)
             .map(|(number, t)| Triangle { corners: t.map(|v| mesh.positions[v as usize]), number })
             .collect();
         if unordered.is_empty() {
-            return Ok(Self { tree: Bvh4::new(&Default::default()), triangles: Vec::new() });
+            return Ok(Self { tree: Bvh4::new(&Default::default()), triangles: Vec::new(), cutouts });
         }
         let mut parameters = BvhBuildParams::medium_build();
         parameters.max_prims_per_leaf = 4;
@@ -51,7 +52,12 @@ impl Obvhs {
         let tree = pool
             .install(|| obvhs::bvh2::builder::build_bvh2(&unordered, parameters, &mut Duration::default()));
         let triangles = tree.primitive_indices.iter().map(|&i| unordered[i as usize]).collect();
-        Ok(Self { tree: Bvh4::new(&tree), triangles })
+        Ok(Self { tree: Bvh4::new(&tree), triangles, cutouts })
+    }
+
+    #[inline(always)]
+    fn stops(&self, ray: &Ray, triangle: &Triangle, &(_, [u, v]): &(f64, [f64; 2])) -> bool {
+        self.cutouts.as_ref().is_none_or(|cutouts| cutouts.stops(cutouts::key(ray), triangle.number, u, v))
     }
 
     fn leaf(&self, first: u32, count: u32) -> &[Triangle] {
@@ -66,7 +72,8 @@ impl Visibility for Obvhs {
         let mut t_max = f64::from(ray.t_max);
         self.tree.traverse(ray, |first, count| {
             for triangle in self.leaf(first, count) {
-                if let Some(met) = shear.meet(&triangle.corners, t_max) {
+                let met = shear.meet(&triangle.corners, t_max);
+                if let Some(met) = met.filter(|met| self.stops(ray, triangle, met)) {
                     t_max = met.0;
                     nearest = Some((triangle.number, met));
                 }
@@ -80,10 +87,10 @@ impl Visibility for Obvhs {
         let shear = Shear::new(ray);
         let mut found = false;
         self.tree.traverse(ray, |first, count| {
-            found = self
-                .leaf(first, count)
-                .iter()
-                .any(|triangle| shear.meet(&triangle.corners, f64::from(ray.t_max)).is_some());
+            found = self.leaf(first, count).iter().any(|triangle| {
+                let met = shear.meet(&triangle.corners, f64::from(ray.t_max));
+                met.is_some_and(|met| self.stops(ray, triangle, &met))
+            });
             if found { f32::NEG_INFINITY } else { ray.t_max }
         });
         found

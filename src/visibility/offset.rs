@@ -10,6 +10,7 @@
 
 use super::Ray;
 use crate::geometry::SurfacePoint;
+use crate::light::LightPoint;
 use glam::DVec3;
 
 /// Shift in units of [`SurfacePoint::error`]: 0.9 at most for the origin's rounding, as much again for the direction's,
@@ -43,6 +44,16 @@ pub fn from_free_point(p: DVec3, direction: DVec3) -> Ray {
 pub fn free_to_surface(p: DVec3, b: &SurfacePoint) -> Ray {
     let error = b.error.max(p.abs().max_element() * f64::from(f32::EPSILON));
     segment(p, shifted(b, p - b.position, error))
+}
+
+/// The ray from a surface to a light, free when they see each other.
+#[inline]
+pub fn to_light(a: &SurfacePoint, light: &LightPoint) -> Ray {
+    match light {
+        LightPoint::Surface(emitter) => between(a, &emitter.point),
+        LightPoint::Lamp(l) => free_to_surface(l.lamp.position, a),
+        LightPoint::Distant(d) => leave(a, -d.direction),
+    }
 }
 
 /// `point` moved off its surface to the side that `toward` points to.

@@ -113,36 +113,52 @@ fn mtl_emission_and_rotation() {
 }
 
 #[test]
+fn mtl_coats() {
+    let coated = |mtl: &str| match scattering(mtl) {
+        Scattering::Coated { albedo, map: None, f0, alpha_x, alpha_y } if alpha_x == alpha_y => {
+            (albedo, f0, alpha_x)
+        }
+        other => panic!("{mtl}: {other:?}"),
+    };
+    let same = |a: (DVec3, DVec3, f64), b: (f64, f64, f64)| {
+        assert!((a.0 - b.0).length() + (a.1 - b.1).length() + (a.2 - b.2).abs() < 1e-12, "{a:?} {b:?}");
+    };
+    same(coated("newmtl m\nKd 0.5\nKs 0.2\nPr 0.1"), (0.5, 0.2, 0.01));
+    same(coated("newmtl m\nKd 0.1\nKs 0.5\nNs 198"), (0.1, 0.5, 0.1));
+    same(coated("newmtl m\nKd 0.1\nKs 0.5\nillum 3"), (0.1, 0.5, 0.0));
+    same(coated("newmtl m\nKd 0.8\nPm 0.25\nPr 0.5"), (0.6, 0.04 * 0.75 + 0.8 * 0.25, 0.25));
+    same(coated("newmtl m\nKd 0.5\nPc 0.5\nPcr 0.2"), (0.5, 0.02, 0.04));
+}
+
+#[test]
+fn mtl_opacity() {
+    assert_eq!(material("newmtl m\nKd 0.5\nTr 0.25").0.opacity, 0.75);
+    assert_eq!(material("newmtl m\nKd 0.5\nd 0.5\nTr 0.25").0.opacity, 0.5);
+    // Glass lets light through by itself.
+    assert_eq!(material("newmtl m\nillum 9\nd 0.5").0.opacity, 1.0);
+}
+
+#[test]
 fn mtl_gaps_are_warnings() {
     for (mtl, warning) in [
-        (
-            "newmtl m\nKd 0.5\n\nKs 0.2",
-            "s.mtl:4: material 'm' has Kd and Ks; a coat over a base is not supported yet: Kd is kept and Ks left out",
-        ),
-        (
-            "newmtl m\nKd 0.1\nKs 0.5",
-            "s.mtl:2: material 'm' has Kd and Ks; a coat over a base is not supported yet: Ks is kept and Kd left out",
-        ),
-        (
-            "newmtl m\nKd 0.1\nPm 0.3",
-            "s.mtl:3: material 'm' is part metal (Pm 0.3); it is taken as no metal at all",
-        ),
         (
             "newmtl m\nKd 1.5 0 0",
             "s.mtl:2: material 'm': Kd [1.5, 0.0, 0.0] is cut to 1, all there is to reflect",
         ),
         (
-            "newmtl m\nKd 0.5\nTr 0.25",
-            "s.mtl:3: material 'm' is 25 % transparent (Tr), which is not supported yet: it is taken as opaque; illum 7 makes it glass",
+            "newmtl m\nKd 0.5\nTr 1",
+            "s.mtl:3: material 'm' is fully transparent (Tr): nothing of it will be seen",
         ),
         (
             "newmtl m\nillum 7\nTf 1 0 0",
             "s.mtl:3: material 'm': coloured glass (Tf) is not supported yet; it is taken as clear",
         ),
         ("newmtl m\nPs 0.5", "s.mtl:2: material 'm': Ps (sheen) is not supported yet"),
-        ("newmtl m\nPc 0.5", "s.mtl:2: material 'm': Pc (clear coat) is not supported yet"),
-        ("newmtl m\nnorm a.png", "s.mtl:2: material 'm': norm is not used yet"),
-        ("newmtl m\nmap_Ke a.png", "s.mtl:2: material 'm': map_Ke is not used yet"),
+        (
+            "newmtl m\nKs 0.5\nPc 0.5",
+            "s.mtl:3: material 'm': Pc (clear coat) over Ks or a metal is not supported yet; it is left out",
+        ),
+        ("newmtl m\nmap_Ks a.png", "s.mtl:2: material 'm': map_Ks is not used yet"),
         ("newmtl m\nbump -bm 2 a.png", "s.mtl:2: material 'm': bump is not used yet"),
         (
             "newmtl m\nKs 1\nhrr_alpha_x 2",
@@ -158,7 +174,7 @@ fn mtl_gaps_are_warnings() {
 
 #[test]
 fn many_warnings_of_a_kind_are_one() {
-    let mtl: String = (0..5).map(|i| format!("newmtl m{i}\nKd 0.5\nKs 0.2\n")).collect();
+    let mtl: String = (0..5).map(|i| format!("newmtl m{i}\nKd 0.5\nPs 0.2\n")).collect();
     let (_, warnings) = material(&mtl);
     assert_eq!(warnings.len(), 1);
     assert!(warnings[0].starts_with("s.mtl:3: ") && warnings[0].ends_with("(and 4 more of this kind)"));
@@ -199,6 +215,27 @@ fn textures_are_found_beside_their_mtl_and_follow_their_options() {
     assert_eq!(*albedo, DVec3::ONE);
     assert!((b.lookup(DVec2::new(0.25, 0.25)) - DVec3::Z).length() < 1e-6);
     assert_eq!(scene.warnings.len(), 1, "{:?}", scene.warnings); // nothing emits
+}
+
+#[test]
+fn every_map_arrives() {
+    let mtl = b"newmtl a\nKd 0.5\nKs 0.5\nmap_Pr -s 2 2 2 four.png\nnorm four.png\nmap_Ke four.png\nmap_d four.png\n\
+                newmtl b\nKs 1\nPr 0.5\nmap_Pr four.png\nKe 2\nmap_Ke four.png\n";
+    let files = Files::new(&[("s.obj", &format!("mtllib s.mtl\n{TRIANGLE}usemtl a\nf 1 2 3\n"))]);
+    files.write("s.mtl", mtl);
+    write_picture(&files.path("four.png"));
+    let scene = files.load("s.obj", &[]).unwrap();
+    assert_eq!(files.warnings(&scene), [""; 0]);
+    let (a, b) = (&scene.materials[0], &scene.materials[1]);
+    // Pixels are red, green / blue, white: of data the red channel counts.
+    let (red, green, white) = (DVec2::new(0.25, 0.75), DVec2::splat(0.75), DVec2::new(0.75, 0.25));
+    let alpha = |m: &hrr::material::Material, uv: DVec2| m.bsdf(uv).glossy().map_or(0.0, |g| g.alpha_x);
+    assert!((alpha(a, red * 0.5) - 1.0).abs() < 1e-6 && alpha(a, green * 0.5) == 0.0);
+    assert!((alpha(b, red) - 0.25).abs() < 1e-6 && b.bsdf(green).is_delta());
+    assert!((a.emission_at(green) - DVec3::Y).length() < 1e-6);
+    assert!((b.emission_at(white) - DVec3::splat(2.0)).length() < 1e-6);
+    assert!((a.opacity_at(red), a.opacity_at(green)) == (1.0, 0.0) && !a.is_opaque() && b.is_opaque());
+    assert!(a.bends_frame() && !b.bends_frame() && !a.is_constant());
 }
 
 #[test]

@@ -1,9 +1,11 @@
 //! TOML scenes and the flags that override them.
 
 use super::*;
-use glam::DVec3;
+use glam::{DVec3, Vec3};
 use hrr::bsdf::Reflectance;
 use hrr::film::Filter;
+use hrr::image::Image;
+use hrr::light::LightSource;
 use hrr::material::Scattering;
 use hrr::settings::Integrator;
 
@@ -114,11 +116,11 @@ fn wrong_keys_and_values_are_named() {
         ("[material.lmp]\nemission = 1", "s.toml:2: no MTL file has a material 'lmp'; did you mean 'lamp'?"),
         (
             "[material.lamp]\nalbedo = 1",
-            "s.toml:3: 'albedo' in [material.lamp] needs a type beside it: diffuse, conductor, dielectric, mirror",
+            "s.toml:3: 'albedo' in [material.lamp] needs a type beside it: diffuse, conductor, dielectric, mirror, coated",
         ),
         (
             "[material.lamp]\ntype = \"difuse\"",
-            "s.toml:3: material.lamp.type is \"difuse\"; it must be one of diffuse, conductor, dielectric, mirror; did you mean 'diffuse'?",
+            "s.toml:3: material.lamp.type is \"difuse\"; it must be one of diffuse, conductor, dielectric, mirror, coated; did you mean 'diffuse'?",
         ),
         (
             "[material.lamp]\ntype = \"diffuse\"\nalbdo = 1",
@@ -169,6 +171,7 @@ fn wrong_keys_and_values_are_named() {
             "[[light]]\ntype = \"sport\"",
             "s.toml:3: light.type is \"sport\"; it must be one of point, spot, directional, environment; did you mean 'spot'?",
         ),
+        ("[material.lamp]\nopacity = 1.5", "s.toml:3: material.lamp.opacity is 1.5; it must lie in 0..=1"),
         ("camera = { fov_y = 0 }", "s.toml:2: camera.fov_y is 0; it must lie between 0 and 180 degrees"),
     ] {
         let (text, code) = toml_error(&format!("{OBJ_LINE}{toml}\n"));
@@ -180,22 +183,91 @@ fn wrong_keys_and_values_are_named() {
 
 #[test]
 fn what_is_to_come_is_unsupported() {
-    for (toml, start) in [
-        ("[camera]\naperture_radius = 0.1", "s.toml:3: not supported: camera.aperture_radius above 0"),
-        ("[[light]]\ntype = \"point\"", "s.toml:3: not supported: point lights"),
-        (
-            "[[light]]\ncolor = [1, 1, 1]\ntype = \"environment\"",
-            "s.toml:4: not supported: environment lights",
-        ),
-        ("[render]\nintegrator = \"bpt+hrr\"", "s.toml:3: not supported: integrator 'bpt+hrr'"),
-    ] {
-        let (text, code) = toml_error(&format!("{OBJ_LINE}{toml}\n"));
-        assert!(text.starts_with(start) && code == 5, "{text} {code}");
-    }
+    let (text, code) = toml_error(&format!("{OBJ_LINE}[render]\nintegrator = \"bpt+hrr\"\n"));
+    assert!(text.starts_with("s.toml:3: not supported: integrator 'bpt+hrr'") && code == 5, "{text} {code}");
+}
+
+#[test]
+fn a_bare_obj_without_emitters_gets_a_white_sky() {
     let files = Files::new(&[("s.obj", &format!("{TRIANGLE}f 1 2 3\n"))]);
-    let e = files.load("s.obj", &[]).unwrap_err();
-    assert!(files.message(&e).starts_with("s.obj: not supported: a uniform environment"), "{e}");
-    assert_eq!(e.exit_code(), 5);
+    let scene = files.load("s.obj", &[]).unwrap();
+    assert!(
+        scene.warnings.iter().any(|w| w.ends_with("it is lit by a uniform white sky")),
+        "{:?}",
+        scene.warnings
+    );
+    let [LightSource::Environment { color, image: None }] = &scene.lights[..] else {
+        panic!("{:?}", scene.lights)
+    };
+    assert_eq!(*color, DVec3::ONE);
+}
+
+#[test]
+fn every_light_arrives() {
+    let files = toml_scene(&format!(
+        "{OBJ_LINE}[camera]\naperture_radius = 0.1\nfocus_distance = 3\n\
+         [[light]]\ntype = \"point\"\nposition = [0, 2, 0]\nintensity = 10\n\
+         [[light]]\ntype = \"spot\"\nposition = [0, 2, 0]\ntarget = [0, 0, 0]\nintensity = [1, 2, 3]\nouter_angle = 60\ninner_angle = 30\n\
+         [[light]]\ntype = \"directional\"\ndirection = [0, -2, 0]\nirradiance = 5\n\
+         [[light]]\ntype = \"environment\"\nfile = \"sky.png\"\ncolor = [1, 2, 3]\n"
+    ));
+    hrr::image::write(
+        &files.path("sky.png"),
+        &Image { width: 2, height: 1, pixels: vec![Vec3::ONE, Vec3::ZERO] },
+        &Default::default(),
+    )
+    .unwrap();
+    let scene = files.load("s.toml", &[]).unwrap();
+    assert_eq!((scene.camera.aperture_radius, scene.camera.focus_distance), (0.1, 3.0));
+    let [point, spot, sun, sky] = &scene.lights[..] else { panic!("{:?}", scene.lights) };
+    assert!(matches!(point, LightSource::Point { position, intensity }
+        if *position == DVec3::Y * 2.0 && *intensity == DVec3::splat(10.0)));
+    assert!(matches!(spot, LightSource::Spot { direction, inner, outer, .. }
+        if *direction == -DVec3::Y && (inner.to_degrees() - 30.0).abs() < 1e-9 && (outer.to_degrees() - 60.0).abs() < 1e-9));
+    assert!(matches!(sun, LightSource::Directional { direction, irradiance }
+        if *direction == -DVec3::Y && *irradiance == DVec3::splat(5.0)));
+    assert!(matches!(sky, LightSource::Environment { color, image: Some(image) }
+        if *color == DVec3::new(1.0, 2.0, 3.0) && image.pixels[0] == Vec3::ONE));
+}
+
+#[test]
+fn wrong_lights_are_named() {
+    for (light, message) in [
+        ("type = \"point\"\nposition = [0, 1, 2]", "s.toml:3: a point light needs the key intensity"),
+        (
+            "type = \"point\"\nposition = [0, 1]",
+            "s.toml:4: expected 3 numbers for light.position, found an array of 2",
+        ),
+        (
+            "type = \"sun\"",
+            "s.toml:3: light.type is \"sun\"; it must be one of point, spot, directional, environment",
+        ),
+        ("type = \"environment\"", "s.toml:3: an environment light needs the key color or file"),
+        ("type = \"environment\"\nfile = \"no.exr\"", "s.toml:4: environment 'no.exr': "),
+        (
+            "type = \"environment\"\ncolour = 1",
+            "s.toml:4: unknown key 'colour' in the environment light; did you mean 'color'?",
+        ),
+        (
+            "type = \"directional\"\ndirection = [0, 0, 0]\nirradiance = 1",
+            "s.toml:4: light.direction is zero",
+        ),
+        (
+            "type = \"spot\"\nposition = [0, 0, 0]\ntarget = [0, 0, 0]\nintensity = 1",
+            "s.toml:5: light.target lies on light.position",
+        ),
+        (
+            "type = \"spot\"\nposition = [0, 0, 0]\ndirection = [0, 0, 1]\nintensity = 1\nouter_angle = 20\ninner_angle = 20",
+            "s.toml:8: light.inner_angle is 20; it must lie between 0 and outer_angle, 20",
+        ),
+        (
+            "type = \"environment\"\ncolor = 1\n[[light]]\ntype = \"environment\"\ncolor = 1",
+            "s.toml:5: a second environment light; there is room for one",
+        ),
+    ] {
+        let (text, code) = toml_error(&format!("{OBJ_LINE}[[light]]\n{light}\n"));
+        assert!(text.starts_with(message) && code == 3, "{text}\nfor\n{light}");
+    }
 }
 
 #[test]
@@ -243,8 +315,8 @@ fn wrong_flags_are_usage_errors() {
         let e = files.load("s.toml", &[flag]).unwrap_err();
         assert_eq!((files.message(&e).as_str(), e.exit_code()), (message, 2));
     }
-    let e = files.load("s.toml", &[("camera.aperture_radius", "1")]).unwrap_err();
-    assert_eq!(e.exit_code(), 5);
+    let e = files.load("s.toml", &[("camera.aperture_radius", "-1")]).unwrap_err();
+    assert_eq!(e.exit_code(), 2);
 }
 
 #[test]

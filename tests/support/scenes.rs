@@ -1,15 +1,19 @@
 //! Scenes of the tests: the project's own at any size, and small ones made in memory.
 
-use glam::{DVec3, Vec3};
+use glam::{DVec2, DVec3, Vec3};
 use hrr::bsdf::Reflectance;
 use hrr::camera::CameraSettings;
 use hrr::film::FilmSettings;
 use hrr::geometry::Mesh;
-use hrr::material::{Material, Scattering};
+use hrr::image::Image;
+use hrr::light::LightSource;
+use hrr::material::{Maps, Material, Scattering};
 use hrr::math::Spectrum;
 use hrr::scene::Scene;
 use hrr::settings::Settings;
+use hrr::texture::Texture;
 use std::path::Path;
+use std::sync::Arc;
 
 /// A scene of the project with some keys changed.
 pub fn load(name: &str, overrides: &[(&str, &str)]) -> Scene {
@@ -34,6 +38,16 @@ pub fn box_of_everything() -> Scene {
         Material::new("glass", Scattering::Dielectric { ior: 1.5, alpha_x: 0.0, alpha_y: 0.0 }),
         Material::new("frosted", Scattering::Dielectric { ior: 1.5, alpha_x: 0.2, alpha_y: 0.2 }),
         lamp,
+        Material::new(
+            "varnish",
+            Scattering::Coated {
+                albedo: Spectrum::new(0.3, 0.5, 0.7),
+                map: None,
+                f0: Spectrum::splat(0.2),
+                alpha_x: 0.15,
+                alpha_y: 0.1,
+            },
+        ),
     ];
     let mut mesh = Mesh::default();
     // Floor, ceiling, left, right, back; front faces inward.
@@ -41,11 +55,60 @@ pub fn box_of_everything() -> Scene {
     quad(&mut mesh, [[-1, 1, -1], [1, 1, -1], [1, 1, 1], [-1, 1, 1]], 1.0, Vec3::ZERO, 1);
     quad(&mut mesh, [[-1, -1, -1], [-1, 1, -1], [-1, 1, 1], [-1, -1, 1]], 1.0, Vec3::ZERO, 2);
     quad(&mut mesh, [[1, -1, 1], [1, 1, 1], [1, 1, -1], [1, -1, -1]], 1.0, Vec3::ZERO, 3);
-    quad(&mut mesh, [[-1, -1, -1], [1, -1, -1], [1, 1, -1], [-1, 1, -1]], 1.0, Vec3::ZERO, 0);
+    quad(&mut mesh, [[-1, -1, -1], [1, -1, -1], [1, 1, -1], [-1, 1, -1]], 1.0, Vec3::ZERO, 7);
     quad(&mut mesh, [[-1, 0, -1], [1, 0, -1], [1, 0, 1], [-1, 0, 1]], 0.4, Vec3::new(0.0, 0.9, 0.0), 6);
     cube(&mut mesh, 0.3, Vec3::new(-0.5, -0.6, 0.1), 4);
     cube(&mut mesh, 0.25, Vec3::new(0.5, -0.6, -0.2), 5);
     in_memory(mesh, materials, DVec3::new(0.1, 0.0, 2.6), DVec3::new(0.0, -0.1, 0.0), 60.0)
+}
+
+/// The same box with what varies over its surfaces: a smooth coat on the floor, uneven roughness and bent normals on the
+/// walls, a cube that is half there and one with holes, and a patterned lamp with holes.
+pub fn box_of_textures() -> Scene {
+    let mut scene = box_of_everything();
+    let map = |pixels: [[f32; 3]; 4]| {
+        let pixels = pixels.map(Vec3::from).to_vec();
+        Some(Texture::new(Arc::new(Image { width: 2, height: 2, pixels }), DVec2::splat(2.0), DVec2::ZERO))
+    };
+    let grey = |a: f32, b: f32| map([[a; 3], [b; 3], [b; 3], [a; 3]]);
+    let m = &mut scene.materials;
+    let coat = Scattering::Coated {
+        albedo: Spectrum::splat(0.6),
+        map: grey(1.0, 0.5),
+        f0: Spectrum::splat(0.15),
+        alpha_x: 0.0,
+        alpha_y: 0.0,
+    };
+    m[0] = Material::new("coat", coat);
+    m[1].set_maps(Maps { roughness: grey(1.0, 0.8), ..Maps::default() });
+    let bumps = [[0.5, 0.5, 1.0], [0.7, 0.5, 0.9], [0.5, 0.3, 0.9], [0.4, 0.6, 0.9]];
+    m[2].set_maps(Maps { normal: map(bumps), ..Maps::default() });
+    m[4] = Material::diffuse("half there", Spectrum::new(0.7, 0.3, 0.3));
+    m[4].opacity = 0.5;
+    m[5].set_maps(Maps { opacity: grey(1.0, 0.0), ..Maps::default() });
+    m[6].set_maps(Maps { emission: grey(1.5, 0.2), opacity: grey(0.4, 1.0), ..Maps::default() });
+    scene
+}
+
+/// A point and a spot light in the box, a sun and an uneven sky in front of it.
+pub fn lights_of_every_kind() -> Vec<LightSource> {
+    let sky = |i: u32| Vec3::splat(0.2 + (i % 7) as f32 * 0.3) * Vec3::new(1.0, 1.2, 1.5);
+    let image = Image { width: 16, height: 8, pixels: (0..16 * 8).map(sky).collect() };
+    vec![
+        LightSource::Point { position: DVec3::new(0.6, 0.3, 0.4), intensity: Spectrum::new(0.5, 0.4, 0.3) },
+        LightSource::Spot {
+            position: DVec3::new(-0.2, 0.5, 0.6),
+            direction: DVec3::new(-0.3, -1.0, -0.5).normalize(),
+            intensity: Spectrum::new(1.0, 2.0, 1.0),
+            inner: 0.4,
+            outer: 0.7,
+        },
+        LightSource::Directional {
+            direction: DVec3::new(-0.2, -0.4, -1.0).normalize(),
+            irradiance: Spectrum::new(1.0, 0.9, 0.8),
+        },
+        LightSource::Environment { color: Spectrum::splat(0.8), image: Some(Arc::new(image)) },
+    ]
 }
 
 /// A scene of 32x32 pixels, as loaded from nowhere.
@@ -54,6 +117,7 @@ pub fn in_memory(mesh: Mesh, materials: Vec<Material>, origin: DVec3, target: DV
         path: "memory".into(),
         mesh,
         materials,
+        lights: Vec::new(),
         camera: CameraSettings { origin, target, fov_y, ..CameraSettings::default() },
         film: FilmSettings { width: 32, height: 32, ..FilmSettings::default() },
         settings: Settings::default(),

@@ -4,7 +4,7 @@ use crate::log::Verbosity;
 use clap::builder::ValueHint;
 use clap::error::ErrorKind;
 use clap::{Arg, ArgAction, ArgMatches, value_parser};
-use hrr::settings::{Kind, Setting, SettingError, Settings, TABLE};
+use hrr::settings::{Effect, Kind, Setting, SettingError, Settings, TABLE};
 use std::ffi::OsString;
 use std::io::Write;
 use std::path::PathBuf;
@@ -14,6 +14,34 @@ use std::path::PathBuf;
 pub enum Command {
     /// `hrr render`.
     Render(RenderArgs),
+    /// `hrr effects`.
+    Effects(EffectsArgs),
+}
+
+/// How `hrr effects` speaks.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Format {
+    /// For people.
+    Table,
+    /// For programs.
+    Json,
+}
+
+/// The arguments of `hrr effects`.
+#[derive(Debug)]
+pub struct EffectsArgs {
+    /// The `.toml` or `.obj` file.
+    pub scene: PathBuf,
+    /// The one effect whose evidence is wanted.
+    pub why: Option<Effect>,
+    /// Table or JSON.
+    pub format: Format,
+    /// Keys of the scene file that are overridden.
+    pub overrides: Vec<(String, String)>,
+    /// Settings that were given.
+    pub settings: Vec<(&'static Setting, String)>,
+    /// How much is said.
+    pub verbosity: Verbosity,
 }
 
 /// The arguments of `hrr render`.
@@ -71,6 +99,7 @@ pub fn parse(args: impl IntoIterator<Item = OsString>) -> Result<Command, clap::
     let matches = command().try_get_matches_from(args)?;
     match matches.subcommand() {
         Some(("render", matches)) => Ok(Command::Render(RenderArgs::new(matches))),
+        Some(("effects", matches)) => Ok(Command::Effects(EffectsArgs::new(matches))),
         // clap knows no other sub-commands, and wants one.
         _ => Err(command().error(ErrorKind::MissingSubcommand, "say what to do, such as 'hrr render'")),
     }
@@ -95,22 +124,46 @@ impl RenderArgs {
         let size = size.iter().flat_map(|(w, h)| {
             [("film.width".to_owned(), w.to_string()), ("film.height".to_owned(), h.to_string())]
         });
-        let given = m.get_many::<(String, String)>("define").into_iter().flatten().cloned();
-        let verbosity = match (m.get_flag("quiet"), m.get_flag("verbose")) {
-            (true, _) => Verbosity::Quiet,
-            (false, false) => Verbosity::Normal,
-            (false, true) => Verbosity::Verbose,
-        };
         Self {
             // clap has seen to it that there is one.
             scene: m.get_one::<PathBuf>("scene").cloned().unwrap_or_default(),
             outputs: m.get_many::<PathBuf>("output").into_iter().flatten().cloned().collect(),
             stats: m.get_one::<PathBuf>("stats").cloned(),
             exposure: m.get_one::<f32>("exposure").copied().unwrap_or(0.0),
-            overrides: given.chain(size).collect(),
-            settings: TABLE.iter().filter_map(|s| Some((s, m.get_one::<String>(s.name)?.clone()))).collect(),
-            verbosity,
+            overrides: overrides(m).chain(size).collect(),
+            settings: settings(m),
+            verbosity: verbosity(m),
         }
+    }
+}
+
+impl EffectsArgs {
+    fn new(m: &ArgMatches) -> Self {
+        let json = m.get_one::<String>("format").is_some_and(|format| format == "json");
+        Self {
+            scene: m.get_one::<PathBuf>("scene").cloned().unwrap_or_default(),
+            why: m.get_one::<Effect>("why").copied(),
+            format: if json { Format::Json } else { Format::Table },
+            overrides: overrides(m).collect(),
+            settings: settings(m),
+            verbosity: verbosity(m),
+        }
+    }
+}
+
+fn overrides(m: &ArgMatches) -> impl Iterator<Item = (String, String)> {
+    m.get_many::<(String, String)>("define").into_iter().flatten().cloned()
+}
+
+fn settings(m: &ArgMatches) -> Vec<(&'static Setting, String)> {
+    TABLE.iter().filter_map(|s| Some((s, m.get_one::<String>(s.name)?.clone()))).collect()
+}
+
+fn verbosity(m: &ArgMatches) -> Verbosity {
+    match (m.get_flag("quiet"), m.get_flag("verbose")) {
+        (true, _) => Verbosity::Quiet,
+        (false, false) => Verbosity::Normal,
+        (false, true) => Verbosity::Verbose,
     }
 }
 
@@ -124,6 +177,7 @@ fn command() -> clap::Command {
         .disable_help_subcommand(true)
         .after_help("'hrr render --help' explains a command.")
         .subcommand(render())
+        .subcommand(effects())
 }
 
 /// What this build was made with.
@@ -140,43 +194,71 @@ fn render() -> clap::Command {
         .after_long_help(format!("{EXAMPLES}\n\n{EXIT_CODES}"))
         .arg_required_else_help(true)
         .next_line_help(false)
-        .arg(
-            Arg::new("scene")
-                .value_name("SCENE")
-                .required(true)
-                .value_parser(value_parser!(PathBuf))
-                .value_hint(ValueHint::FilePath)
-                .help("Scene file: .toml, or a bare .obj"),
-        )
+        .arg(scene_arg())
         .args(output_args())
+        .args(common_args())
+}
+
+fn effects() -> clap::Command {
+    clap::Command::new("effects")
+        .about("Say what a scene calls for, why, and what that switches on")
+        .after_help("'hrr effects --help' tells more.")
+        .after_long_help(EXIT_CODES)
+        .arg_required_else_help(true)
+        .next_line_help(false)
+        .arg(scene_arg())
         .arg(
-            Arg::new("define")
-                .short('D')
-                .long("define")
-                .value_name("KEY=VALUE")
-                .help_heading(SCENE)
-                .action(ArgAction::Append)
-                .value_parser(parse_define)
-                .help("Override a key of the scene file, such as camera.fov_y=30; may be repeated"),
-        )
-        .args(TABLE.iter().map(setting_arg))
-        .arg(
-            Arg::new("quiet")
-                .short('q')
-                .long("quiet")
-                .help_heading(MESSAGES)
-                .action(ArgAction::SetTrue)
-                .conflicts_with("verbose")
-                .help("Print errors only"),
+            Arg::new("why")
+                .long("why")
+                .value_name("EFFECT")
+                .help_heading(OUTPUT)
+                .value_parser(|text: &str| text.parse::<Effect>())
+                .help("Show the evidence for one verdict: materials, triangles, bounds of textures, paths"),
         )
         .arg(
-            Arg::new("verbose")
-                .short('v')
-                .long("verbose")
-                .help_heading(MESSAGES)
-                .action(ArgAction::SetTrue)
-                .help("Print settings, times and counts as well"),
+            Arg::new("format")
+                .long("format")
+                .value_name("FORMAT")
+                .help_heading(OUTPUT)
+                .value_parser(["table", "json"])
+                .help("How it is said [default: table]"),
         )
+        .args(common_args())
+}
+
+fn scene_arg() -> Arg {
+    Arg::new("scene")
+        .value_name("SCENE")
+        .required(true)
+        .value_parser(value_parser!(PathBuf))
+        .value_hint(ValueHint::FilePath)
+        .help("Scene file: .toml, or a bare .obj")
+}
+
+/// What all commands that read a scene have in common.
+fn common_args() -> Vec<Arg> {
+    let define = Arg::new("define")
+        .short('D')
+        .long("define")
+        .value_name("KEY=VALUE")
+        .help_heading(SCENE)
+        .action(ArgAction::Append)
+        .value_parser(parse_define)
+        .help("Override a key of the scene file, such as camera.fov_y=30; may be repeated");
+    let quiet = Arg::new("quiet")
+        .short('q')
+        .long("quiet")
+        .help_heading(MESSAGES)
+        .action(ArgAction::SetTrue)
+        .conflicts_with("verbose")
+        .help("Print errors only");
+    let verbose = Arg::new("verbose")
+        .short('v')
+        .long("verbose")
+        .help_heading(MESSAGES)
+        .action(ArgAction::SetTrue)
+        .help("Print settings, times and counts as well");
+    [define].into_iter().chain(TABLE.iter().map(setting_arg)).chain([quiet, verbose]).collect()
 }
 
 fn output_args() -> [Arg; 4] {
@@ -276,8 +358,10 @@ mod tests {
     use super::*;
 
     fn parsed(line: &str) -> Result<RenderArgs, clap::Error> {
-        let Command::Render(args) = parse(line.split_whitespace().map(OsString::from))?;
-        Ok(args)
+        match parse(line.split_whitespace().map(OsString::from))? {
+            Command::Render(args) => Ok(args),
+            Command::Effects(args) => panic!("{args:?}"),
+        }
     }
 
     #[test]

@@ -1,6 +1,7 @@
-//! The program `hrr`: renders scenes from the command line. Data goes to stdout, everything else to stderr.
+//! The program `hrr`: renders scenes from the command line, and says what they call for. Data goes to stdout, everything else to stderr.
 
 mod args;
+mod effects;
 mod log;
 mod progress;
 mod render;
@@ -26,9 +27,17 @@ fn run() -> u8 {
         Ok(command) => command,
         Err(e) => return args::explain(&e),
     };
-    let Command::Render(args) = command;
-    let log = Log::new(args.verbosity);
-    render::run(&args, &log).unwrap_or_else(|error| {
+    let (log, done) = match command {
+        Command::Render(args) => {
+            let log = Log::new(args.verbosity);
+            (log, render::run(&args, &log))
+        }
+        Command::Effects(args) => {
+            let log = Log::new(args.verbosity);
+            (log, effects::run(&args, &log))
+        }
+    };
+    done.unwrap_or_else(|error| {
         log.error(&error);
         error.exit_code()
     })

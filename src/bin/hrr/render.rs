@@ -1,15 +1,17 @@
 //! `hrr render`: a scene to images.
 
 use crate::args::RenderArgs;
-use crate::log::{Log, duration, quantity};
+use crate::log::{Log, Verbosity, duration, quantity};
 use crate::progress::Reporter;
+use hrr::effects;
 use hrr::error::Place;
 use hrr::file;
 use hrr::image::{self, Attributes, Format};
 use hrr::integrator::Size;
+use hrr::integrator::{self, Plan};
 use hrr::render::counters::{Stats, peak_rss_bytes};
 use hrr::scene::Scene;
-use hrr::settings::{SettingError, Settings};
+use hrr::settings::{Setting, SettingError, Settings};
 use hrr::{Error, Result};
 use std::io::Write;
 use std::path::Path;
@@ -23,7 +25,7 @@ const INTERRUPTED: u8 = 130;
 pub fn run(args: &RenderArgs, log: &Log) -> Result<u8> {
     let start = Instant::now();
     // What cannot succeed is said before any work is done.
-    apply(args, &mut Settings::default())?;
+    apply(&args.settings, &mut Settings::default())?;
     check_outputs(args)?;
 
     let scene = Scene::load(&args.scene, &args.overrides)?;
@@ -31,7 +33,7 @@ pub fn run(args: &RenderArgs, log: &Log) -> Result<u8> {
         log.warning(warning);
     }
     let mut settings = scene.settings.clone();
-    apply(args, &mut settings)?;
+    apply(&args.settings, &mut settings)?;
     let load = start.elapsed().as_secs_f64();
     announce(&scene, &settings, load, log);
 
@@ -49,7 +51,7 @@ pub fn run(args: &RenderArgs, log: &Log) -> Result<u8> {
     }
     stats.seconds.load = load;
     let image = outcome.film.image();
-    let mut attributes = attributes(&scene, &settings, &stats, outcome.film.samples());
+    let mut attributes = attributes(&scene, &settings, &stats, outcome.film.samples(), &outcome.plan);
     if !outcome.sizes.is_empty() {
         attributes.set("hrr:sizes", sizes(&outcome.sizes));
     }
@@ -73,8 +75,8 @@ pub fn run(args: &RenderArgs, log: &Log) -> Result<u8> {
 }
 
 /// Gives the settings the values of the flags.
-fn apply(args: &RenderArgs, settings: &mut Settings) -> Result<()> {
-    for (setting, value) in &args.settings {
+pub fn apply(given: &[(&'static Setting, String)], settings: &mut Settings) -> Result<()> {
+    for (setting, value) in given {
         let flag = format!("--{}", setting.name.replace('_', "-"));
         setting.set(settings, value).map_err(|e| match e {
             SettingError::Invalid(message) => Error::Usage(format!("{flag}: {message}")),
@@ -105,7 +107,7 @@ fn stop_on_interrupt(reporter: &Arc<Reporter>) -> Result<()> {
 }
 
 /// What an EXR file says about its making.
-fn attributes(scene: &Scene, settings: &Settings, stats: &Stats, samples: u64) -> Attributes {
+fn attributes(scene: &Scene, settings: &Settings, stats: &Stats, samples: u64, plan: &Plan) -> Attributes {
     let mut a = Attributes::new();
     a.set("samplesPerPixel", samples);
     a.set("renderTimeSeconds", stats.seconds.render as f32);
@@ -118,8 +120,10 @@ fn attributes(scene: &Scene, settings: &Settings, stats: &Stats, samples: u64) -
     a.set("hrr:iterations", stats.iterations);
     a.set("hrr:visibility", stats.visibility.as_str());
     a.set("hrr:threads", stats.threads as u64);
-    // No integrator of today drops a kind of path.
-    a.set("hrr:biased", 0u64);
+    let verdicts: Vec<_> = stats.effects.iter().map(|(id, verdict)| format!("{id}={verdict}")).collect();
+    a.set("hrr:effects", verdicts.join(" "));
+    a.set("hrr:machinery", plan.machinery.join(" "));
+    a.set("hrr:biased", u64::from(plan.is_biased()));
     a
 }
 
@@ -155,6 +159,13 @@ fn announce(scene: &Scene, settings: &Settings, load: f64, log: &Log) {
         scene.film.width,
         scene.film.height,
     ));
+    let effects = effects::analyze(scene, settings);
+    if let Ok(plan) = integrator::plan::plan(scene, settings, &effects) {
+        let all = log.verbosity() == Verbosity::Verbose;
+        for line in crate::effects::table(&effects, &plan, all, None) {
+            log.info(line.trim_end());
+        }
+    }
     log.detail(format_args!("the scene was loaded in {}", duration(load)));
     for line in settings.to_toml().lines() {
         log.detail(line);
