@@ -219,10 +219,10 @@ impl EyeVertex {
     pub fn merge(&self, techniques: &Techniques, merging: &Merging, light: &Walk) -> Spectrum {
         let vertex = &self.walk.vertex;
         let value = self.walk.throughput * vertex.factor(vertex.wo, light.vertex.wo) * light.throughput;
-        if value == Spectrum::ZERO {
-            return value;
-        }
         let stored = techniques.stored(light);
+        if value == Spectrum::ZERO || stored == 0.0 {
+            return Spectrum::ZERO;
+        }
         let eta = merging.eta() * stored;
         let light_total = techniques.light_total(light, vertex.wo);
         let eye_total = self.total(techniques, light.vertex.wo, light.origins[0]);

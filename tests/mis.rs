@@ -28,7 +28,7 @@ const TECHNIQUES: Techniques = Techniques {
     base: 1.7,
     roulette: Some(Roulette { light_subpaths: 1400.0, constant: 0.02, max_alpha: 0.3 }),
     merging: Some(Merging { light_subpaths: 1400.0, radius: 0.01 }),
-    storing: Storing { share: 0.3, max_alpha: 0.22, lamps_seen: false },
+    storing: Storing { share: 0.3, max_alpha: 0.22, lamps: false },
     guide: None,
 };
 
@@ -108,8 +108,8 @@ impl Path {
         let has = |role: Role, i: usize| {
             let origin = if i == 1 { Origin::Lamp } else { t.storing.origin(&self.surfaces[i - 2].bsdf) };
             match (role, origin) {
+                (_, Origin::Lamp) if !t.storing.lamps => 0.0,
                 (Role::Stored, Origin::Lamp | Origin::Broad) => t.storing.share,
-                (Role::Seen, Origin::Lamp) if !t.storing.lamps_seen => 0.0,
                 _ => 1.0,
             }
         };
@@ -248,8 +248,8 @@ fn check_guided(scene: &Scene, heuristic: Heuristic) {
     let guide = EmissionGuide::learn(&world.lights, observations).map(Arc::new);
     assert!(guide.is_some());
     for guide in [None, guide] {
-        for lamps_seen in [false, true] {
-            let storing = Storing { lamps_seen, ..TECHNIQUES.storing };
+        for lamps in [false, true] {
+            let storing = Storing { lamps, ..TECHNIQUES.storing };
             check(&world, &Techniques { heuristic, guide: guide.clone(), storing, ..TECHNIQUES });
         }
     }
@@ -359,7 +359,7 @@ fn check(world: &World<'_>, t: &Techniques) {
             let value = eye.merge(t, merging, &light);
             let tries = merging.eta() * t.stored(&light);
             let plain = eye.walk.throughput * z.factor(z.wo, y.wo) * light.throughput / tries;
-            if plain.x > 0.0 {
+            if plain.x > 0.0 && tries > 0.0 {
                 close("merging", value.x / plain.x, path.weight(world, t, 1, lights.len() + 1));
                 count(4, &path);
             }

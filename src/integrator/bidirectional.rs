@@ -92,7 +92,7 @@ impl<'a> Bidirectional<'a> {
         self.techniques.storing = Storing {
             share: if thin { self.settings.storing } else { 1.0 },
             max_alpha: self.settings.hrr_alpha,
-            lamps_seen: !self.recipe.next_event,
+            lamps: !self.recipe.next_event,
         };
         let (recipe, n_l) = (&self.recipe, self.size.light_subpaths as f64);
         let eye_samples = f64::from(self.size.samples);
@@ -142,9 +142,14 @@ impl<'a> Bidirectional<'a> {
         self.recipe.base != Base::Off || self.recipe.roulette || self.recipe.merging
     }
 
+    /// Whether the cache has all light vertices, for want of any other use than picks.
+    fn stores_all(&self) -> bool {
+        !self.recipe.roulette && !self.recipe.merging
+    }
+
     /// Whether uniform picks have a cache of their own.
     fn picks_apart(&self) -> bool {
-        self.techniques.storing.share < 1.0 && matches!(self.recipe.base, Base::Uniform | Base::Probabilistic)
+        !self.stores_all() && matches!(self.recipe.base, Base::Uniform | Base::Probabilistic)
     }
 
     /// The light vertices to pick from where the roulette is off, and how many subpaths left them.
@@ -178,7 +183,7 @@ impl<'a> Bidirectional<'a> {
             while let Some(light) = walk.filter(|light| light.depth < self.settings.max_depth) {
                 if !light.vertex.bsdf.is_delta() {
                     if self.keeps_vertices() && light.depth + more <= self.settings.max_depth {
-                        let stored = self.techniques.stored(&light);
+                        let stored = if self.stores_all() { 1.0 } else { self.techniques.stored(&light) };
                         if stored == 1.0 || sampler.u1(light.depth, Purpose::Storing) < stored {
                             cache.push(&light);
                         }

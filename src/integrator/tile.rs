@@ -9,6 +9,10 @@ use rayon::prelude::*;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 const SIDE: u32 = 16;
+
+/// Pixels of a tile, and what was seen there.
+type Watched = Vec<(u32, u32, PixelSums)>;
+
 /// One tile in this many has its shadow rays and queries timed.
 const TIMED: usize = 16;
 
@@ -40,7 +44,7 @@ pub(super) fn sample_film(
     let (across, down) = (width.div_ceil(SIDE), height.div_ceil(SIDE));
     let (tiles, done) = ((across * down) as usize, AtomicUsize::new(0));
     let plans = adaptive.as_deref();
-    let parts: Vec<(Tally, Vec<(u32, u32, PixelSums)>)> = (0..tiles)
+    let parts: Vec<(Tally, Watched)> = (0..tiles)
         .into_par_iter()
         .map(|tile| {
             let (mut tally, mut watched) = (Tally::default(), Vec::new());

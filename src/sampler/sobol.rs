@@ -2,8 +2,8 @@
 //! point into each of as many equal intervals, and rectangles, of the unit square.
 //!
 //! Shuffling by keys keeps this, and makes sequences of different keys independent, so that they can be used side by side
-//! for any number of purposes ("padding") [Burley20]. The permutation is a nested uniform one, of Laine and Karras's kind
-//! with better mixing [Vegdahl21]. Numbers are read from the point down: the lowest bit of a point's place in the sequence
+//! for any number of purposes ("padding") \[Burley20\]. The permutation is a nested uniform one, of Laine and Karras's kind
+//! with better mixing \[Vegdahl21\]. Numbers are read from the point down: the lowest bit of a point's place in the sequence
 //! is the highest of its coordinate.
 
 /// A place in the sequence, as points read it.

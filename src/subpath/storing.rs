@@ -2,8 +2,9 @@
 //!
 //! What comes from a diffuse surface or straight from a lamp, eye subpaths and next-event estimation find as well; what
 //! a glossy or perfectly smooth surface has thrown is a caustic. So the roulette's cache has a light vertex always when its
-//! predecessor scatters narrowly, and else with a small probability. And the camera is not connected to vertices straight
-//! from a lamp, which next-event estimation sees without noise. Both are part of every weight.
+//! predecessor scatters narrowly, and else with a small probability. Vertices straight from a lamp, which next-event
+//! estimation sees without noise, are left to it: the camera is not connected to them, and they are neither kept nor merged.
+//! All of this is part of every weight.
 
 use crate::bsdf::Bsdf;
 use crate::mis::Heuristic;
@@ -35,13 +36,13 @@ pub struct Storing {
     pub share: f64,
     /// GGX roughness up to which scattering is narrow.
     pub max_alpha: f64,
-    /// Whether the camera is connected to vertices straight from a lamp.
-    pub lamps_seen: bool,
+    /// Whether vertices straight from a lamp have any role.
+    pub lamps: bool,
 }
 
 impl Storing {
     /// All of them.
-    pub const ALL: Self = Self { share: 1.0, max_alpha: 1.0, lamps_seen: true };
+    pub const ALL: Self = Self { share: 1.0, max_alpha: 1.0, lamps: true };
 
     /// What a surface is to the vertex that it throws light on.
     #[inline]
@@ -54,8 +55,8 @@ impl Storing {
     #[inline]
     pub fn probability(&self, role: Role, origin: Origin) -> f64 {
         match (role, origin) {
+            (_, Origin::Lamp) if !self.lamps => 0.0,
             (Role::Stored, Origin::Lamp | Origin::Broad) => self.share,
-            (Role::Seen, Origin::Lamp) if !self.lamps_seen => 0.0,
             _ => 1.0,
         }
     }

@@ -21,13 +21,21 @@ pub struct Estimate {
 pub fn estimate(scene: &Scene, settings: &Settings, block: u32) -> Estimate {
     let world = World::new(scene, settings).unwrap();
     let mut integrator = hrr::integrator::new(&world, settings).unwrap();
+    estimate_of(scene, settings.iterations, block, |iteration| {
+        let mut film = Film::new(&scene.film);
+        integrator.iterate(iteration, &mut film, &|_| ()).unwrap();
+        film
+    })
+}
+
+/// What independent films say together.
+pub fn estimate_of(scene: &Scene, films: u64, block: u32, mut film: impl FnMut(u64) -> Film) -> Estimate {
     let blocks = (scene.film.width.div_ceil(block), scene.film.height.div_ceil(block));
     let count = (blocks.0 * blocks.1) as usize;
     let (mut sum, mut square) = (vec![0.0; count], vec![0.0; count]);
     let (mut total, mut total_square) = (DVec3::ZERO, DVec3::ZERO);
-    for iteration in 0..settings.iterations {
-        let mut film = Film::new(&scene.film);
-        integrator.iterate(iteration, &mut film, &|_| ()).unwrap();
+    for index in 0..films {
+        let film = film(index);
         assert_eq!(film.dropped(), 0, "samples that are not finite");
         let mut now = vec![0.0; count];
         let mut all = DVec3::ZERO;
@@ -45,7 +53,7 @@ pub fn estimate(scene: &Scene, settings: &Settings, block: u32) -> Estimate {
         total += all;
         total_square += all * all;
     }
-    let n = settings.iterations as f64;
+    let n = films as f64;
     let variance = |sum: f64, square: f64| ((square / n - (sum / n) * (sum / n)) / (n - 1.0)).max(0.0);
     Estimate {
         mean: sum.iter().map(|s| s / n).collect(),

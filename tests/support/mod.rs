@@ -8,6 +8,7 @@ pub mod chart;
 pub mod distribution;
 pub mod estimate;
 pub mod quadrature;
+pub mod calls_of_bytes;
 pub mod query_of_bytes;
 pub mod scenes;
 pub mod shapes;
