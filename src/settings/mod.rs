@@ -365,7 +365,7 @@ mod tests {
     #[test]
     fn a_slip_is_told_what_was_meant() {
         assert!(message("max_dept", "3").contains("did you mean 'max_depth'?"));
-        assert!(message("zzz", "3").contains("there are integrator, max_depth"));
+        assert!(message("zzz", "3").contains("there are integrator, with, without, max_depth"));
         assert!(message("integrator", "lvc-hrr").contains("did you mean 'lvc+hrr'?"));
         assert!(message("visibility", "9").contains("one of embree, obvhs, brute"));
     }
