@@ -33,6 +33,7 @@ pub mod connect;
 
 pub mod integrator;
 pub mod render;
+pub mod report;
 
 pub mod ffi;
 

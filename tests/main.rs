@@ -20,4 +20,6 @@ mod visibility;
 mod determinism;
 mod layers;
 mod mis;
+mod flip;
+mod report;
 mod ffi;

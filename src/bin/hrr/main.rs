@@ -1,12 +1,14 @@
 //! The program `hrr`: renders scenes from the command line. Data goes to stdout, everything else to stderr.
 
 mod args;
+mod compare;
 mod log;
 mod progress;
 mod render;
+mod scene_args;
 
 use args::Command;
-use log::Log;
+use log::{Log, Verbosity};
 use std::backtrace::{Backtrace, BacktraceStatus};
 use std::io::Write;
 use std::panic::{self, PanicHookInfo, UnwindSafe};
@@ -26,9 +28,14 @@ fn run() -> u8 {
         Ok(command) => command,
         Err(e) => return args::explain(&e),
     };
-    let Command::Render(args) = command;
-    let log = Log::new(args.verbosity);
-    render::run(&args, &log).unwrap_or_else(|error| {
+    let (log, result) = match command {
+        Command::Render(args) => {
+            let log = Log::new(args.verbosity);
+            (log, render::run(&args, &log))
+        }
+        Command::Compare(args) => (Log::new(Verbosity::Normal), compare::run(&args)),
+    };
+    result.unwrap_or_else(|error| {
         log.error(&error);
         error.exit_code()
     })

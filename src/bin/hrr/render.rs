@@ -1,19 +1,102 @@
 //! `hrr render`: a scene to images.
 
-use crate::args::RenderArgs;
-use crate::log::{Log, duration, quantity};
+use crate::args::{EXIT_CODES, exposure_arg, message_args, verbosity};
+use crate::log::{Log, Verbosity, duration, quantity};
 use crate::progress::Reporter;
-use hrr::error::Place;
+use crate::scene_args::{self, SceneArgs};
+use clap::builder::ValueHint;
+use clap::{Arg, ArgAction, ArgMatches, value_parser};
 use hrr::file;
 use hrr::image::{self, Attributes, Format};
 use hrr::render::counters::{Stats, peak_rss_bytes};
 use hrr::scene::Scene;
-use hrr::settings::{SettingError, Settings};
+use hrr::settings::Settings;
 use hrr::{Error, Result};
 use std::io::Write;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Instant;
+
+/// The arguments of `hrr render`.
+#[derive(Debug)]
+pub struct RenderArgs {
+    /// The scene and its settings.
+    pub scene: SceneArgs,
+    /// Where the image goes; at least one file.
+    pub outputs: Vec<PathBuf>,
+    /// Where the statistics go; `-` is stdout.
+    pub stats: Option<PathBuf>,
+    /// Stops by which PNG files are brighter.
+    pub exposure: f32,
+    /// How much is said.
+    pub verbosity: Verbosity,
+}
+
+const OUTPUT: &str = "Output";
+
+const EXAMPLES: &str = "\
+Examples:
+  hrr render scene.toml -o out.exr
+      the scene as its file says
+  hrr render scene.toml -o out.exr -o out.png --exposure 1 --time 30
+      30 seconds of rendering; an EXR file, and a PNG file one stop brighter
+  hrr render model.obj -o quick.png --size 320x240 --iterations 4
+      a first look at a bare OBJ file
+  hrr render scene.toml -o a.exr -D camera.fov_y=30 -D material.mirror.alpha=\"[1e-3, 1e-3]\"
+      with two keys of the scene file changed
+
+What is given here wins over the scene file, which wins over the defaults.
+Ctrl-C finishes the iteration and writes the image; a second one stops at once.";
+
+impl RenderArgs {
+    pub fn new(m: &ArgMatches) -> Self {
+        Self {
+            scene: SceneArgs::new(m),
+            outputs: m.get_many::<PathBuf>("output").into_iter().flatten().cloned().collect(),
+            stats: m.get_one::<PathBuf>("stats").cloned(),
+            exposure: m.get_one::<f32>("exposure").copied().unwrap_or(0.0),
+            verbosity: verbosity(m),
+        }
+    }
+}
+
+/// The sub-command.
+pub fn command() -> clap::Command {
+    clap::Command::new("render")
+        .about("Render a scene to an image")
+        .after_help("'hrr render --help' tells more, with examples.")
+        .after_long_help(format!("{EXAMPLES}\n\n{EXIT_CODES}"))
+        .arg_required_else_help(true)
+        .next_line_help(false)
+        .arg(scene_args::scene())
+        .args(output_args())
+        .args(scene_args::changes(|_| true))
+        .args(message_args())
+}
+
+fn output_args() -> [Arg; 4] {
+    [
+        Arg::new("output")
+            .short('o')
+            .long("output")
+            .value_name("FILE")
+            .help_heading(OUTPUT)
+            .required(true)
+            .action(ArgAction::Append)
+            .value_parser(value_parser!(PathBuf))
+            .value_hint(ValueHint::FilePath)
+            .help("Where the image goes: .exr (linear) or .png (sRGB); may be repeated"),
+        Arg::new("stats")
+            .long("stats")
+            .value_name("FILE")
+            .help_heading(OUTPUT)
+            .value_parser(value_parser!(PathBuf))
+            .value_hint(ValueHint::FilePath)
+            .help("Where times and counts go, as JSON; '-' is stdout"),
+        scene_args::size(OUTPUT),
+        exposure_arg(OUTPUT, "Makes PNG files brighter, or darker when negative"),
+    ]
+}
 
 /// Exit code of a render that was stopped, as shells have it for SIGINT.
 const INTERRUPTED: u8 = 130;
@@ -22,15 +105,10 @@ const INTERRUPTED: u8 = 130;
 pub fn run(args: &RenderArgs, log: &Log) -> Result<u8> {
     let start = Instant::now();
     // What cannot succeed is said before any work is done.
-    apply(args, &mut Settings::default())?;
+    args.scene.check()?;
     check_outputs(args)?;
 
-    let scene = Scene::load(&args.scene, &args.overrides)?;
-    for warning in &scene.warnings {
-        log.warning(warning);
-    }
-    let mut settings = scene.settings.clone();
-    apply(args, &mut settings)?;
+    let (scene, settings) = args.scene.load(|warning| log.warning(warning))?;
     let load = start.elapsed().as_secs_f64();
     announce(&scene, &settings, load, log);
 
@@ -63,18 +141,6 @@ pub fn run(args: &RenderArgs, log: &Log) -> Result<u8> {
     details(&stats, log);
     summary(args, &stats, outcome.interrupted, log);
     Ok(if outcome.interrupted { INTERRUPTED } else { 0 })
-}
-
-/// Gives the settings the values of the flags.
-fn apply(args: &RenderArgs, settings: &mut Settings) -> Result<()> {
-    for (setting, value) in &args.settings {
-        let flag = format!("--{}", setting.name.replace('_', "-"));
-        setting.set(settings, value).map_err(|e| match e {
-            SettingError::Invalid(message) => Error::Usage(format!("{flag}: {message}")),
-            SettingError::NotYet(message) => Error::Unsupported { place: Place::file(flag), message },
-        })?;
-    }
-    Ok(())
 }
 
 fn check_outputs(args: &RenderArgs) -> Result<()> {
