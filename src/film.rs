@@ -177,6 +177,12 @@ impl Film {
         Ok(())
     }
 
+    /// The sums of a row of pixels, in double precision.
+    pub fn row(&self, y: u32) -> Vec<Spectrum> {
+        let row = self.rows[y as usize].lock().unwrap_or_else(|poisoned| poisoned.into_inner());
+        row.iter().map(|sums| Spectrum::from_array(sums.map(|v| v as f64 / ONE))).collect()
+    }
+
     /// The mean of a pixel, in double precision.
     pub fn mean(&self, x: u32, y: u32) -> Spectrum {
         let row = self.rows[y as usize].lock().unwrap_or_else(|poisoned| poisoned.into_inner());

@@ -1,8 +1,13 @@
 //! What accuracy costs: the sub-commands that measure it, from outside.
 
 use crate::support::program::Place;
+use crate::support::scenes;
 use glam::Vec3;
 use hrr::image::{self, Attributes, Image};
+use hrr::render::{Outcome, Silent, render};
+use hrr::report::metric;
+use hrr::scene::Scene;
+use hrr::settings::{Backend, Integrator, Settings};
 
 fn write(place: &Place, name: &str, value: impl Fn(u32) -> Vec3) {
     let image = Image { width: 20, height: 20, pixels: (0..400).map(value).collect() };
@@ -66,5 +71,85 @@ fn compare_refuses_what_makes_no_sense() {
         let (found, out, err) = place.run(line);
         assert_eq!((found, out.as_str()), (code, ""), "{line}: {err}");
         assert!(err.starts_with("hrr: ") && err.contains(wanted), "{line}: {err}");
+    }
+}
+
+#[test]
+fn render_stops_at_the_wanted_error_and_says_when_it_misses() {
+    let place = Place::new();
+    let (code, out, err) =
+        place.run("render scene.toml -o a.exr --variance v.exr --error 0.1 --stats - --size 32x32");
+    assert_eq!(code, 0, "{err}");
+    let iterations = serde_json::from_str::<serde_json::Value>(&out).unwrap()["iterations"].as_u64().unwrap();
+    assert!(err.lines().last().unwrap().contains("with 90 % confidence"), "{err}");
+    // Half the error takes four times as long.
+    let (_, out, _) = place.run("render scene.toml -o b.exr --error 0.05 --stats - --size 32x32");
+    let more = serde_json::from_str::<serde_json::Value>(&out).unwrap()["iterations"].as_u64().unwrap();
+    assert!(iterations >= 8 && (3 * iterations..5 * iterations).contains(&more), "{iterations} {more}");
+    let variance = image::read(&place.path("v.exr")).unwrap();
+    assert!(
+        variance.pixels.iter().all(|v| v.min_element() >= 0.0) && variance.pixels.iter().any(|v| v.x > 0.0)
+    );
+
+    let (code, _, err) = place.run("render scene.toml -o c.exr --error 1e-6 --time 0.2");
+    assert!(code == 1 && err.contains("was not reached") && place.path("c.exr").exists(), "{code} {err}");
+    for (line, code, wanted) in [
+        ("--error 0.1 --iterations 5", 2, "cannot be used with"),
+        ("--error 0", 2, "from 1e-6"),
+        ("--variance v.png", 4, ".exr"),
+        ("--variance v.exr --iterations 1", 4, "at least two"),
+    ] {
+        let (found, _, err) = place.run(&format!("render scene.toml -o d.exr {line}"));
+        assert!(found == code && err.contains(wanted), "{line}: {found} {err}");
+    }
+}
+
+/// The box, seen below its lamp.
+fn box_below_the_lamp() -> Scene {
+    let below = [("camera.target", "[0, 0.7, 0]"), ("camera.fov_y", "22")];
+    scenes::load("cornell", &[&[("film.width", "32"), ("film.height", "32")][..], &below].concat())
+}
+
+fn run(scene: &Scene, integrator: Integrator, seed: u64, error: Option<f64>, iterations: u64) -> Outcome {
+    let visibility = Backend::BEST;
+    let settings =
+        Settings { integrator, seed, error, visibility, iterations, max_depth: 4, ..Settings::default() };
+    render(scene, &settings, &Silent).unwrap()
+}
+
+/// The true error lies under the stated one as often as stated, though renders stop where they please: pixels that err
+/// independently, and pixels that share light subpaths.
+#[test]
+fn the_stated_error_holds_as_often_as_stated() {
+    let scene = box_below_the_lamp();
+    for (integrator, target) in [(Integrator::Pt, 0.25), (Integrator::Lvc, 0.2)] {
+        let truth = run(&scene, integrator, 1000, None, 1500);
+        let own = truth.noise.error().unwrap().expected;
+        let truth = truth.film.image();
+        assert!(own < 0.2 * target, "the reference's own error is {own}");
+        let (mut under, mut expected, mut errors) = (0, 0.0, 0.0);
+        for seed in 0..60 {
+            let outcome = run(&scene, integrator, seed, Some(target), 0);
+            let stated = outcome.noise.error().unwrap();
+            assert!(stated.bound <= target, "{stated:?}");
+            let error = metric::compare(&outcome.film.image(), &truth, None, 0.0).unwrap().error;
+            under += u32::from(error <= stated.bound);
+            (expected, errors) = (expected + stated.expected.powi(2), errors + error * error);
+        }
+        let ratio = (errors / expected).sqrt();
+        println!("{integrator:?}: {under} of 60, errors over expected ones {ratio:.3}, reference {own:.3}");
+        // 90 % of 60 is 54; fewer than 46 come about by chance once in 1000 times.
+        assert!(under >= 46, "{integrator:?}: {under} of 60 true errors are under the bounds of 90 %");
+        assert!((ratio - 1.0).abs() < 0.1, "{integrator:?}: errors are {ratio} of what was expected");
+    }
+}
+
+/// Where rare bright samples decide, nothing is promised: the path tracer meets the lamp by way of the metal block.
+#[test]
+fn no_promise_is_made_where_rare_samples_decide() {
+    let scene = box_below_the_lamp();
+    for (integrator, sure) in [(Integrator::Pt, false), (Integrator::Lvc, true)] {
+        let error = run(&scene, integrator, 1, None, 100).noise.error().unwrap();
+        assert_eq!(error.is_sure(), sure, "{integrator:?} {error:?}");
     }
 }

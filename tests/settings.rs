@@ -22,6 +22,7 @@ fn other_value(name: &str) -> &'static str {
         "hrr_alpha" => "0.125",
         "iterations" => "9",
         "time" => "30.5",
+        "error" => "0.25",
         "first_iteration" => "64",
         "seed" => "9223372036854775807",
         "visibility" => "brute",
@@ -48,6 +49,7 @@ fn every_field_has_its_row() {
         iterations,
         first_iteration,
         time,
+        error,
         seed,
         threads,
         samples,
@@ -67,10 +69,11 @@ fn every_field_has_its_row() {
     assert_eq!((integrator, visibility), (Integrator::LvcHrr, Backend::Brute));
     assert_eq!((max_depth, samples, light_subpaths, connections), (7, 2, 1234, 3));
     assert_eq!((iterations, first_iteration, time, seed), (9, 64, Some(30.5), i64::MAX as u64));
+    assert_eq!(error, Some(0.25));
     assert_eq!((threads, expected, hrr_alpha, mis), (2, 0.25, 0.125, Heuristic::Power));
     assert_eq!((merge_radius, merge_pixels, merge_shrink), (0.5, 5.0, 1.0));
     assert_eq!((reused_subpaths, record_spacing), (50, 4));
-    assert_eq!((storing, guiding, TABLE.len()), (0.5, Guiding::Off, 21));
+    assert_eq!((storing, guiding, TABLE.len()), (0.5, Guiding::Off, 22));
 }
 
 #[test]

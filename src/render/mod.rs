@@ -1,9 +1,11 @@
 //! A whole render: iterations until their number, the time or the observer says enough.
 
 pub mod counters;
+pub mod noise;
 pub mod observer;
 
 pub use counters::{Counters, Memory, Seconds, Stats};
+pub use noise::{ErrorEstimate, Noise};
 pub use observer::{Observer, Progress, Silent};
 
 use crate::error::{Error, Result};
@@ -24,6 +26,8 @@ pub struct Outcome {
     pub film: Film,
     /// What was done and what it cost. `seconds.load` and `seconds.total` are for the caller to fill in.
     pub stats: Stats,
+    /// What the iterations' scatter tells of the error.
+    pub noise: Noise,
     /// Whether the observer ended it.
     pub interrupted: bool,
 }
@@ -56,13 +60,19 @@ fn run(scene: &Scene, settings: &Settings, observer: &dyn Observer) -> Result<Ou
     let mut bytes = (0, 0);
 
     let start = Instant::now();
-    let iterations = settings.time.is_none().then_some(settings.iterations);
+    let open_ended = settings.time.is_some() || settings.error.is_some();
+    let iterations = (!open_ended).then_some(settings.iterations);
+    let mut noise = Noise::new(film.width(), film.height());
     let accepted = AtomicU64::new(0);
     let mut finished = 0;
     let mut interrupted = false;
     loop {
         let elapsed = start.elapsed().as_secs_f64();
         if iterations.is_some_and(|n| finished >= n) || settings.time.is_some_and(|t| elapsed >= t) {
+            break;
+        }
+        let error = noise.error().map(|e| e.bound);
+        if error.zip(settings.error).is_some_and(|(error, target)| error <= target) {
             break;
         }
         if observer.should_stop() {
@@ -76,16 +86,20 @@ fn run(scene: &Scene, settings: &Settings, observer: &dyn Observer) -> Result<Ou
                 fraction,
                 elapsed: start.elapsed().as_secs_f64(),
                 time_limit: settings.time,
+                error,
+                target: settings.error,
                 accepted: accepted.load(Ordering::Relaxed),
             });
         };
         progress(0.0);
         tally.add(&integrator.iterate(settings.first_iteration + finished, &mut film, &progress)?);
         finished += 1;
+        noise.update(&film, finished, false);
         accepted.store(tally.roulette.accepted, Ordering::Relaxed);
         let (cache, tree) = integrator.bytes();
         bytes = (bytes.0.max(cache), bytes.1.max(tree));
     }
+    noise.update(&film, finished, true);
     let render = start.elapsed().as_secs_f64();
     if film.dropped() > 0 {
         observer.warn(&format!(
@@ -132,7 +146,7 @@ fn run(scene: &Scene, settings: &Settings, observer: &dyn Observer) -> Result<Ou
             vertex_bvh_bytes: bytes.1 as u64,
         },
     };
-    Ok(Outcome { film, stats, interrupted })
+    Ok(Outcome { film, stats, noise, interrupted })
 }
 
 /// What `auto` stands for: the least machinery that finds all of the scene's light.

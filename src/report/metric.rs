@@ -8,13 +8,10 @@ use super::flip;
 use crate::error::{Error, Result};
 use crate::image::Image;
 use crate::math::luminance;
+use crate::math::relative::{TILE, Tiles, floor, local_square, median, relative_square, trimmed_mean};
 use glam::DVec3;
 use serde::Serialize;
 
-/// `eps` of relative errors, in units of the reference's mean luminance.
-pub const FLOOR: f64 = 0.01;
-/// Side of the tiles whose means are tested, pixels.
-pub const TILE: u32 = 16;
 /// Sides of images are told apart by this many standard deviations.
 const SIGMAS: f64 = 2.0;
 
@@ -29,6 +26,9 @@ pub struct Metrics {
     pub relmse_trim01: f64,
     /// The same without the worst hundredth of the pixels.
     pub relmse_trim1: f64,
+    /// Root of the mean square difference of all pixels but the worst thousandth, relative to the reference's tiles
+    /// ([`local_square`](crate::math::relative::local_square)): what `hrr render --error` estimates.
+    pub error: f64,
     /// Root of the median pixel's relative square difference.
     pub median_nrmse: f64,
     /// Mean of |a - r| / (|a| + |r|), 0..=1; 0 where both are 0.
@@ -59,7 +59,8 @@ pub struct Deviation {
 }
 
 /// The names that [`Metrics::get`] knows, in order.
-pub const NAMES: [&str; 9] = [
+pub const NAMES: [&str; 10] = [
+    "error",
     "mse",
     "relmse",
     "relmse_trim01",
@@ -75,6 +76,7 @@ impl Metrics {
     /// A metric by its name; `None` for unknown names and for tests without variances.
     pub fn get(&self, name: &str) -> Option<f64> {
         Some(match name {
+            "error" => self.error,
             "mse" => self.mse,
             "relmse" => self.relmse,
             "relmse_trim01" => self.relmse_trim01,
@@ -114,8 +116,19 @@ pub fn compare(
         |f: &dyn Fn(usize) -> f64| finite.iter().map(|&i| f(i)).sum::<f64>() / finite.len() as f64;
     let (a, r) = (|i: usize| image.pixels[i].as_dvec3(), |i: usize| reference.pixels[i].as_dvec3());
     let eps = floor(mean_of_finite(&|i| luminance(r(i))));
-    let mut relative: Vec<f64> = finite.iter().map(|&i| relative_square(a(i) - r(i), r(i), eps)).collect();
-    relative.sort_by(f64::total_cmp);
+    let mut relative: Vec<f64> =
+        finite.iter().map(|&i| relative_square((a(i) - r(i)) * (a(i) - r(i)), r(i), eps)).collect();
+    let tiles = Tiles::new(image.width, image.height);
+    let at = |i: usize| (i as u32 % image.width, i as u32 / image.width);
+    let means = tiles.means(|x, y| {
+        let l = luminance(r((y * image.width + x) as usize));
+        if l.is_finite() { l } else { 0.0 }
+    });
+    let local = |i: usize| {
+        let (x, y) = at(i);
+        local_square((a(i) - r(i)) * (a(i) - r(i)), means[tiles.of(x, y)], eps)
+    };
+    let mut local: Vec<f64> = finite.iter().map(|&i| local(i)).collect();
     let smape = |i: usize| {
         let (a, r) = (a(i), r(i));
         let channel = |c: usize| {
@@ -127,38 +140,16 @@ pub fn compare(
     let seen = flip::map(&shown(image, exposure), &shown(reference, exposure), flip::PIXELS_PER_DEGREE);
     Ok(Metrics {
         mse: mean_of_finite(&|i| (a(i) - r(i)).length_squared() / 3.0),
-        relmse: trimmed_mean(&relative, 0.0),
-        relmse_trim01: trimmed_mean(&relative, 0.001),
-        relmse_trim1: trimmed_mean(&relative, 0.01),
-        median_nrmse: median(&relative).sqrt(),
+        relmse: trimmed_mean(&mut relative, 0.0),
+        relmse_trim01: trimmed_mean(&mut relative, 0.001),
+        relmse_trim1: trimmed_mean(&mut relative, 0.01),
+        error: trimmed_mean(&mut local, 0.001).sqrt(),
+        median_nrmse: median(&mut relative).sqrt(),
         smape: mean_of_finite(&smape),
         flip: mean_of_finite(&|i| seen[i]),
         nonfinite: (image.pixels.len() - finite.len()) as u64,
         deviation: variances.map(|(va, vr)| deviation(image, reference, va, vr)),
     })
-}
-
-/// `eps` of relative errors for a reference's mean luminance; never 0, so that black images compare.
-pub fn floor(mean_luminance: f64) -> f64 {
-    (FLOOR * mean_luminance.abs()).max(1e-30)
-}
-
-/// A pixel's relative square error: the mean over its channels.
-pub fn relative_square(difference: DVec3, reference: DVec3, eps: f64) -> f64 {
-    let d = difference * difference / (reference * reference + DVec3::splat(eps * eps));
-    (d.x + d.y + d.z) / 3.0
-}
-
-/// The mean of ascending values without the greatest `share` of them, rounded down to whole values.
-pub fn trimmed_mean(sorted: &[f64], share: f64) -> f64 {
-    let kept = &sorted[..sorted.len() - (sorted.len() as f64 * share) as usize];
-    kept.iter().sum::<f64>() / kept.len() as f64
-}
-
-/// The middle of ascending values, or the mean of the two in the middle.
-pub fn median(sorted: &[f64]) -> f64 {
-    let n = sorted.len();
-    (sorted[(n - 1) / 2] + sorted[n / 2]) / 2.0
 }
 
 /// What a display shows; what is not finite is black.
@@ -245,6 +236,7 @@ mod tests {
         near(m.relmse, (first + second) / 2.0);
         near(m.relmse_trim1, m.relmse);
         near(m.median_nrmse, m.relmse.sqrt());
+        near(m.error * m.error, (0.25 / 3.0 + 1.0) / 2.0 / 4.0004);
         near(m.smape, (0.5 / 2.5 / 3.0 + 1.0 / 5.0) / 2.0);
         assert_eq!((m.nonfinite, &m.deviation), (0, &None));
         let same = compare(&r, &r, None, 0.0).unwrap();
@@ -278,7 +270,8 @@ mod tests {
         let scaled = |i: &Image| i.exposed(10.0);
         let (m, s) =
             (compare(&a, &r, None, 0.0).unwrap(), compare(&scaled(&a), &scaled(&r), None, -10.0).unwrap());
-        assert!((m.relmse - s.relmse).abs() < 1e-12 && (m.flip - s.flip).abs() < 1e-9);
+        assert!((m.relmse - s.relmse).abs() < 1e-12 && (m.error - s.error).abs() < 1e-12);
+        assert!((m.flip - s.flip).abs() < 1e-9);
         assert!((s.mse / m.mse / 2f64.powi(20) - 1.0).abs() < 1e-12);
     }
 

@@ -33,6 +33,8 @@ Examples:
       a test: is the difference more than noise?
 
 Metrics, all 0 for equal images:
+  error          what 'hrr render --error' estimates: without the worst thousandth of the pixels, the root of the mean
+                 of d^2 / (t^2 + eps^2), t the mean luminance of the 16 x 16 pixels around, eps a hundredth of the image's
   mse            mean square difference
   relmse         mean of (a - r)^2 / (r^2 + eps^2), eps a hundredth of the reference's mean luminance
   relmse_trim01  the same without the worst thousandth of the pixels
@@ -106,7 +108,7 @@ pub fn command() -> clap::Command {
 /// Does it; returns the exit code.
 pub fn run(args: &CompareArgs) -> Result<u8> {
     if args.variances.is_none()
-        && let Some((name, _)) = args.limits.iter().find(|(name, _)| NAMES[7..].contains(name))
+        && let Some((name, _)) = args.limits.iter().find(|(name, _)| NAMES[8..].contains(name))
     {
         return Err(Error::Usage(format!("--max {name}: needs --variance and --reference-variance")));
     }

@@ -1,7 +1,7 @@
 //! `hrr render`: a scene to images.
 
 use crate::args::{EXIT_CODES, exposure_arg, message_args, verbosity};
-use crate::log::{Log, Verbosity, duration, quantity};
+use crate::log::{Log, Verbosity, duration, percent, quantity};
 use crate::progress::Reporter;
 use crate::scene_args::{self, SceneArgs};
 use clap::builder::ValueHint;
@@ -9,6 +9,8 @@ use clap::{Arg, ArgAction, ArgMatches, value_parser};
 use hrr::file;
 use hrr::image::{self, Attributes, Format};
 use hrr::render::counters::{Stats, peak_rss_bytes};
+use hrr::render::noise::LEAST_HILL;
+use hrr::render::{ErrorEstimate, Noise};
 use hrr::scene::Scene;
 use hrr::settings::Settings;
 use hrr::{Error, Result};
@@ -24,6 +26,8 @@ pub struct RenderArgs {
     pub scene: SceneArgs,
     /// Where the image goes; at least one file.
     pub outputs: Vec<PathBuf>,
+    /// Where the variances of the pixels go.
+    pub variance: Option<PathBuf>,
     /// Where the statistics go; `-` is stdout.
     pub stats: Option<PathBuf>,
     /// Stops by which PNG files are brighter.
@@ -40,6 +44,8 @@ Examples:
       the scene as its file says
   hrr render scene.toml -o out.exr -o out.png --exposure 1 --time 30
       30 seconds of rendering; an EXR file, and a PNG file one stop brighter
+  hrr render scene.toml -o out.exr --error 0.02 --time 600
+      until the relative error is below 2 % with 90 % confidence; exit code 1 if that takes longer than 10 minutes
   hrr render model.obj -o quick.png --size 320x240 --iterations 4
       a first look at a bare OBJ file
   hrr render scene.toml -o a.exr -D camera.fov_y=30 -D material.mirror.alpha=\"[1e-3, 1e-3]\"
@@ -53,6 +59,7 @@ impl RenderArgs {
         Self {
             scene: SceneArgs::new(m),
             outputs: m.get_many::<PathBuf>("output").into_iter().flatten().cloned().collect(),
+            variance: m.get_one::<PathBuf>("variance").cloned(),
             stats: m.get_one::<PathBuf>("stats").cloned(),
             exposure: m.get_one::<f32>("exposure").copied().unwrap_or(0.0),
             verbosity: verbosity(m),
@@ -74,7 +81,7 @@ pub fn command() -> clap::Command {
         .args(message_args())
 }
 
-fn output_args() -> [Arg; 4] {
+fn output_args() -> [Arg; 5] {
     [
         Arg::new("output")
             .short('o')
@@ -86,6 +93,17 @@ fn output_args() -> [Arg; 4] {
             .value_parser(value_parser!(PathBuf))
             .value_hint(ValueHint::FilePath)
             .help("Where the image goes: .exr (linear) or .png (sRGB); may be repeated"),
+        Arg::new("variance")
+            .long("variance")
+            .value_name("FILE")
+            .help_heading(OUTPUT)
+            .value_parser(value_parser!(PathBuf))
+            .value_hint(ValueHint::FilePath)
+            .help("Where the variance of each pixel goes: .exr, squares of the image's unit")
+            .long_help(
+                "Where the variance of each pixel goes: .exr, squares of the image's unit\nIt is told from how the \
+                 iterations differ; 'hrr compare' takes it.",
+            ),
         Arg::new("stats")
             .long("stats")
             .value_name("FILE")
@@ -126,24 +144,62 @@ pub fn run(args: &RenderArgs, log: &Log) -> Result<u8> {
     }
     stats.seconds.load = load;
     let image = outcome.film.image();
-    let attributes = attributes(&scene, &settings, &stats, outcome.film.samples());
+    let error = outcome.noise.error();
+    let attributes = attributes(&scene, &settings, &stats, outcome.film.samples(), error);
     // One bad disk does not keep the image from the others.
     let written = args.outputs.iter().map(|path| match Format::of(path)? {
         Format::Exr => image::write(path, &image, &attributes),
         Format::Png => image::write(path, &image.exposed(args.exposure), &attributes),
     });
     let written: Vec<Result<()>> = written.collect();
+    let variance =
+        args.variance.as_deref().map_or(Ok(()), |path| write_variance(path, &outcome.noise, &attributes));
     stats.memory.peak_rss_bytes = stats.memory.peak_rss_bytes.max(peak_rss_bytes());
     stats.seconds.total = start.elapsed().as_secs_f64();
     let reported = args.stats.as_deref().map_or(Ok(()), |path| write_stats(path, &stats));
-    written.into_iter().chain([reported]).collect::<Result<()>>()?;
+    written.into_iter().chain([variance, reported]).collect::<Result<()>>()?;
 
     details(&stats, log);
-    summary(args, &stats, outcome.interrupted, log);
-    Ok(if outcome.interrupted { INTERRUPTED } else { 0 })
+    summary(args, &stats, error, outcome.interrupted, log);
+    let missed = judge(&settings, error, &stats.integrator, log);
+    Ok(match (outcome.interrupted, missed) {
+        (true, _) => INTERRUPTED,
+        (false, missed) => u8::from(missed),
+    })
+}
+
+/// Says how far the error can be trusted; returns whether a target was missed.
+fn judge(settings: &Settings, error: Option<ErrorEstimate>, integrator: &str, log: &Log) -> bool {
+    if settings.error.is_some() && (integrator.starts_with("vcm") || integrator.starts_with("pcvcm")) {
+        log.warning("vertex merging blurs; the error tells noise only, not the blur");
+    }
+    if let Some(e) = error.filter(|e| !e.is_sure()) {
+        let message = format_args!(
+            "no promise: rare bright samples make the noise (Hill index {:.1}; below {LEAST_HILL} its square is not known, \
+             below 2 it has no mean), and rarer and brighter ones may not have been found yet",
+            e.hill
+        );
+        if settings.error.is_some() { log.warning(message) } else { log.detail(message) }
+    }
+    let Some(target) = settings.error else { return false };
+    let missed = error.is_none_or(|e| e.bound > target);
+    if missed {
+        let reached = error.map_or("not known yet".to_owned(), |e| percent(e.bound));
+        log.warning(format_args!("the error of {} was not reached: it is {reached}", percent(target)));
+    }
+    missed
 }
 
 fn check_outputs(args: &RenderArgs) -> Result<()> {
+    if let Some(path) = &args.variance {
+        if Format::of(path)? != Format::Exr {
+            return Err(Error::Output {
+                path: path.clone(),
+                message: "variances are written as .exr".into(),
+            });
+        }
+        image::check_writable(path)?;
+    }
     args.outputs.iter().try_for_each(|path| image::check_writable(path))?;
     match &args.stats {
         Some(path) if !is_stdout(path) => file::check_writable(path),
@@ -164,7 +220,13 @@ fn stop_on_interrupt(reporter: &Arc<Reporter>) -> Result<()> {
 }
 
 /// What an EXR file says about its making.
-fn attributes(scene: &Scene, settings: &Settings, stats: &Stats, samples: u64) -> Attributes {
+fn attributes(
+    scene: &Scene,
+    settings: &Settings,
+    stats: &Stats,
+    samples: u64,
+    error: Option<ErrorEstimate>,
+) -> Attributes {
     let mut a = Attributes::new();
     a.set("samplesPerPixel", samples);
     a.set("renderTimeSeconds", stats.seconds.render as f32);
@@ -177,9 +239,22 @@ fn attributes(scene: &Scene, settings: &Settings, stats: &Stats, samples: u64) -
     a.set("hrr:iterations", stats.iterations);
     a.set("hrr:visibility", stats.visibility.as_str());
     a.set("hrr:threads", stats.threads as u64);
+    if let Some(error) = error {
+        a.set("hrr:error", error.expected as f32);
+        a.set("hrr:errorBound90", error.bound as f32);
+        a.set("hrr:hillIndex", error.hill as f32);
+    }
     // No integrator of today drops a kind of path.
     a.set("hrr:biased", 0u64);
     a
+}
+
+fn write_variance(path: &Path, noise: &Noise, attributes: &Attributes) -> Result<()> {
+    let variance = noise.variance().ok_or_else(|| Error::Output {
+        path: path.to_owned(),
+        message: "one iteration tells no variance; run at least two".into(),
+    })?;
+    image::write(path, &variance, attributes)
 }
 
 fn is_stdout(path: &Path) -> bool {
@@ -196,9 +271,13 @@ fn write_stats(path: &Path, stats: &Stats) -> Result<()> {
 }
 
 fn announce(scene: &Scene, settings: &Settings, load: f64, log: &Log) {
-    let budget = match settings.time {
-        Some(seconds) => duration(seconds),
-        None => format!("{} iterations", settings.iterations),
+    let budget = match (settings.error, settings.time) {
+        (Some(error), None) => format!("to an error of {}", percent(error)),
+        (Some(error), Some(seconds)) => {
+            format!("to an error of {}, {} at most", percent(error), duration(seconds))
+        }
+        (None, Some(seconds)) => duration(seconds),
+        (None, None) => format!("{} iterations", settings.iterations),
     };
     log.info(format_args!(
         "rendering {}: {} triangles, {}x{} pixels, {budget}",
@@ -246,11 +325,14 @@ fn details(stats: &Stats, log: &Log) {
 }
 
 /// The last line: where the image is.
-fn summary(args: &RenderArgs, stats: &Stats, interrupted: bool, log: &Log) {
+fn summary(args: &RenderArgs, stats: &Stats, error: Option<ErrorEstimate>, interrupted: bool, log: &Log) {
     let files: Vec<_> = args.outputs.iter().map(|p| p.display().to_string()).collect();
     let s = if stats.iterations == 1 { "" } else { "s" };
+    let error = error.map_or(String::new(), |e| {
+        format!(", error {} (below {} with 90 % confidence)", percent(e.expected), percent(e.bound))
+    });
     log.info(format_args!(
-        "{}{}: {} iteration{s} in {}",
+        "{}{}: {} iteration{s} in {}{error}",
         if interrupted { "stopped; " } else { "" },
         files.join(", "),
         stats.iterations,

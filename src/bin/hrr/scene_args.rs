@@ -125,7 +125,7 @@ fn setting_arg(setting: &'static Setting) -> Arg {
         .value_parser(move |text: &str| check(setting, text))
         .long_help(format!("{help}{doc}"))
         .help(help);
-    if setting.name == "time" { arg.conflicts_with("iterations") } else { arg }
+    if ["time", "error"].contains(&setting.name) { arg.conflicts_with("iterations") } else { arg }
 }
 
 /// Passes on what the setting takes. A name that is not available yet is left to be refused with its own exit code.
