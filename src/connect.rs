@@ -17,8 +17,8 @@ pub struct EyeVertex {
     pub walk: Walk,
     /// The roulette's lobes here; empty where it is off.
     pub lobes: Lobes,
-    /// m of the edge to the previous eye vertex, were this vertex the light subpath's last; over the probability of
-    /// storing it, if that edge does not lead to the camera.
+    /// m of the edge to the previous eye vertex or the camera, were this vertex the light subpath's last; over the
+    /// probability of storing it.
     m_previous: f64,
     /// m of that edge, were this vertex on an emitter.
     m_emitter: f64,
@@ -78,12 +78,8 @@ impl EyeVertex {
     /// The sum over the eye side's techniques up to this vertex: of those that do not need it stored as a light vertex,
     /// and, over the probability of that, of those that do. `back`: density of scattering to the previous vertex, 1/sr.
     fn totals(&self, techniques: &Techniques, back: f64) -> [f64; 2] {
-        let (heuristic, side, eta) = (techniques.heuristic, &self.walk.side, techniques.eta());
-        if self.walk.depth == 1 {
-            [heuristic.total(side, self.m_previous, back, 0.0), heuristic.raise(eta)]
-        } else {
-            [heuristic.total(side, 0.0, back, 0.0), heuristic.total(side, self.m_previous, 0.0, eta)]
-        }
+        let (heuristic, side) = (techniques.heuristic, &self.walk.side);
+        [heuristic.total(side, 0.0, back, 0.0), heuristic.total(side, self.m_previous, 0.0, techniques.eta())]
     }
 
     /// Radiance that this vertex emits itself, by technique s = 0.
@@ -184,7 +180,7 @@ impl EyeVertex {
 }
 
 /// Technique s = k-1: a light vertex seen by the camera. The value, for the sum over a film's eye samples, belongs at
-/// the raster position if the ray is free.
+/// the raster position if the ray is free. For light vertices that are stored, with the probability of that.
 pub fn connect_camera(
     world: &World<'_>,
     techniques: &Techniques,
@@ -199,7 +195,7 @@ pub fn connect_camera(
         return None;
     }
     let l = techniques.light_others(light, pdf, -edge.w);
-    let m = techniques.light_image;
+    let m = techniques.light_image * techniques.stored(light);
     let ray = offset::free_to_surface(world.camera.position, &y.point);
     Some((raster, value * (techniques.heuristic.weight(l, m, 0.0) / m), ray))
 }

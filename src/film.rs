@@ -52,6 +52,10 @@ pub struct Film {
     filter: Filter,
     rows: Vec<Mutex<Vec<Pixel>>>,
     samples: u64,
+    /// What each sample to come counts for.
+    weight: u32,
+    /// What all samples of a pixel count for.
+    weights: u64,
     dropped: AtomicU64,
 }
 
@@ -65,6 +69,8 @@ impl Film {
             filter: settings.filter,
             rows: (0..settings.height).map(|_| row()).collect(),
             samples: 0,
+            weight: 1,
+            weights: 0,
             dropped: AtomicU64::new(0),
         }
     }
@@ -84,6 +90,11 @@ impl Film {
         self.samples
     }
 
+    /// What the samples of a pixel count for so far: their number, unless [`Film::set_weight`] was called.
+    pub fn weights(&self) -> u64 {
+        self.weights
+    }
+
     /// Values that were not finite and therefore left out. Always 0 unless hrr has a bug.
     pub fn dropped(&self) -> u64 {
         self.dropped.load(Ordering::Relaxed)
@@ -92,6 +103,12 @@ impl Film {
     /// Says that every pixel has had `n` more samples.
     pub fn count_samples(&mut self, n: u64) {
         self.samples += n;
+        self.weights += n * u64::from(self.weight);
+    }
+
+    /// What each sample to come counts for in the mean, beside 1 at the start: for iterations of different quality.
+    pub fn set_weight(&mut self, weight: u32) {
+        self.weight = weight;
     }
 
     /// Adds the sum of a pixel's samples, each a raster position and a value, as [`Film::add`] does for one. The sum of
@@ -150,7 +167,8 @@ impl Film {
 
     fn add_pixel(&self, x: u32, y: u32, value: Spectrum) {
         let (x, y) = (x.min(self.width - 1), y.min(self.height - 1));
-        let fixed = value.to_array().map(|v| (v * ONE) as i128);
+        let scale = ONE * f64::from(self.weight);
+        let fixed = value.to_array().map(|v| (v * scale) as i128);
         let mut row = self.rows[y as usize].lock().unwrap_or_else(|poisoned| poisoned.into_inner());
         for (sum, v) in row[x as usize].iter_mut().zip(fixed) {
             *sum = sum.saturating_add(v);
@@ -173,6 +191,7 @@ impl Film {
             }
         }
         self.samples += other.samples;
+        self.weights += other.weights;
         *self.dropped.get_mut() += other.dropped();
         Ok(())
     }
@@ -186,10 +205,10 @@ impl Film {
     /// The mean of a pixel, in double precision.
     pub fn mean(&self, x: u32, y: u32) -> Spectrum {
         let row = self.rows[y as usize].lock().unwrap_or_else(|poisoned| poisoned.into_inner());
-        Spectrum::from_array(row[x as usize].map(|v| v as f64 / (ONE * self.samples.max(1) as f64)))
+        Spectrum::from_array(row[x as usize].map(|v| v as f64 / (ONE * self.weights.max(1) as f64)))
     }
 
-    /// The image so far: sums divided by the number of samples; black when there are none.
+    /// The image so far: weighted means of the samples; black when there are none.
     pub fn image(&self) -> Image {
         let pixels: Vec<Vec3> =
             (0..self.height).flat_map(|y| (0..self.width).map(move |x| self.mean(x, y).as_vec3())).collect();
@@ -226,6 +245,17 @@ mod tests {
                 }
             }
         }
+    }
+
+    #[test]
+    fn samples_count_by_their_weight() {
+        let mut film = film(Filter::Box);
+        film.add(DVec2::ONE, Spectrum::ONE);
+        film.count_samples(1);
+        film.set_weight(3);
+        film.add(DVec2::ONE, Spectrum::splat(5.0));
+        film.count_samples(1);
+        assert_eq!((film.samples(), film.mean(1, 1)), (2, Spectrum::splat(4.0)));
     }
 
     #[test]

@@ -22,6 +22,8 @@ pub struct Tally {
     pub merged: u64,
     /// Seconds tracing light subpaths, their connections to the camera included.
     pub light_trace: f64,
+    /// Seconds by the clock on the wall until the eye side began, and of the eye side.
+    pub sides: [f64; 2],
     /// Seconds building the vertex BVH.
     pub vertex_bvh_build: f64,
     /// Seconds on the eye side, less `roulette` and `visibility`.
@@ -45,6 +47,7 @@ impl Tally {
         self.visible_connections += other.visible_connections;
         self.merged += other.merged;
         self.light_trace += other.light_trace;
+        self.sides = [0, 1].map(|i| self.sides[i] + other.sides[i]);
         self.vertex_bvh_build += other.vertex_bvh_build;
         self.eye_trace += other.eye_trace;
         self.roulette_seconds += other.roulette_seconds;

@@ -22,7 +22,7 @@ pub struct Techniques {
     pub eye_hits: f64,
     /// m_1: next-event estimation, relative to emission, which draws its points from the same density.
     pub next_event: f64,
-    /// m_{k-1}: light subpaths seen by the camera, light subpaths over eye samples.
+    /// m_{k-1}, over the probability of storing: light subpaths seen by the camera, light subpaths over eye samples.
     pub light_image: f64,
     /// m_s, 2 <= s <= k-2, where the roulette is off.
     pub base: f64,

@@ -104,7 +104,7 @@ impl Path {
                 return t.next_event;
             }
             if s == k - 1 {
-                return t.light_image;
+                return t.light_image * stored(s - 1);
             }
             let lobes = t.lobes(&self.surfaces[s - 1], self.to(world, s, s + 1));
             let offset = self.position(world, s - 1) - self.position(world, s);
@@ -303,7 +303,8 @@ fn check(world: &World<'_>, t: &Techniques) {
             let w = path.to(world, k - 2, k - 1);
             let plain =
                 light.throughput * y.factor(w, y.wo) * (path.g(world, k - 1, k - 2) * world.camera.pdf_w(-w));
-            close("s = k-1", value.x / plain.x * t.light_image, path.weight(world, t, 0, k - 1));
+            let tries = t.light_image * t.stored(light);
+            close("s = k-1", value.x / plain.x * tries, path.weight(world, t, 0, k - 1));
             count(3, &path);
         }
     }

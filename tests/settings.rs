@@ -21,6 +21,7 @@ fn other_value(name: &str) -> &'static str {
         "merge_shrink" => "1.0",
         "hrr_alpha" => "0.125",
         "iterations" => "9",
+        "memory" => "3.5",
         "time" => "30.5",
         "error" => "0.25",
         "first_iteration" => "64",
@@ -50,6 +51,7 @@ fn every_field_has_its_row() {
         first_iteration,
         time,
         error,
+        memory,
         seed,
         threads,
         samples,
@@ -70,10 +72,10 @@ fn every_field_has_its_row() {
     assert_eq!((max_depth, samples, light_subpaths, connections), (7, 2, 1234, 3));
     assert_eq!((iterations, first_iteration, time, seed), (9, 64, Some(30.5), i64::MAX as u64));
     assert_eq!(error, Some(0.25));
-    assert_eq!((threads, expected, hrr_alpha, mis), (2, 0.25, 0.125, Heuristic::Power));
+    assert_eq!((threads, memory, expected, hrr_alpha, mis), (2, 3.5, 0.25, 0.125, Heuristic::Power));
     assert_eq!((merge_radius, merge_pixels, merge_shrink), (0.5, 5.0, 1.0));
     assert_eq!((reused_subpaths, record_spacing), (50, 4));
-    assert_eq!((storing, guiding, TABLE.len()), (0.5, Guiding::Off, 22));
+    assert_eq!((storing, guiding, TABLE.len()), (0.5, Guiding::Off, 23));
 }
 
 #[test]

@@ -2,9 +2,9 @@
 //! leans forward and shows it from above.
 
 use super::obj::Obj;
+use super::parts::{self, Strip};
 use super::{File, scene};
 use glam::{DAffine3, DQuat, DVec3, dvec3};
-use std::f64::consts::TAU;
 
 /// Centre of what makes the caustic, on the floor.
 const STAGE: DVec3 = dvec3(0.0, 0.0, -0.78);
@@ -12,8 +12,6 @@ const STAGE: DVec3 = dvec3(0.0, 0.0, -0.78);
 const LAMP: DVec3 = dvec3(-1.12, 0.62, -1.39);
 /// Side of the square lamp.
 const LAMP_SIDE: f64 = 0.02;
-/// Segments of the metal strip.
-const SEGMENTS: usize = 240;
 
 const MTL: &str = "\
 newmtl floor
@@ -154,7 +152,7 @@ fn room(comment: &str) -> Obj {
     obj.part("blue_box", "blue");
     let turned = DQuat::from_rotation_y(f64::to_radians(25.0));
     obj.cuboid(DAffine3::from_rotation_translation(turned, dvec3(0.6, 0.08, -1.12)), DVec3::splat(0.08));
-    lamp(&mut obj);
+    parts::lamp(&mut obj, LAMP, STAGE, LAMP_SIDE);
     // A dim panel overhead keeps shadows from being black.
     obj.part("sky", "sky");
     obj.quad([p(-0.6, 1.7, -1.0), p(0.6, 1.7, -1.0), p(0.6, 1.7, 0.2), p(-0.6, 1.7, 0.2)]);
@@ -171,15 +169,8 @@ fn stand(obj: &mut Obj) {
     let half = 0.5 * width;
     obj.part("mirror", "mirror");
     obj.quad_with_uv([at(-half, 0.0), at(half, 0.0), at(half, height), at(-half, height)]);
-    obj.part("frame", "wood");
-    let mut bar = |x: f64, y: f64, half_x: f64, half_y: f64| {
-        obj.cuboid(place * DAffine3::from_translation(dvec3(x, y, 0.0)), dvec3(half_x, half_y, border * 0.6));
-    };
+    parts::frame(obj, place, half, height, border, border * 0.6);
     let outer = half + border;
-    bar(0.0, -0.5 * border, outer, 0.5 * border);
-    bar(0.0, height + 0.5 * border, outer, 0.5 * border);
-    bar(-half - 0.5 * border, 0.5 * height, 0.5 * border, 0.5 * height);
-    bar(half + 0.5 * border, 0.5 * height, 0.5 * border, 0.5 * height);
     obj.part("posts", "wood");
     let pivot = at(0.0, 0.5 * height);
     for side in [-1.0, 1.0] {
@@ -189,38 +180,9 @@ fn stand(obj: &mut Obj) {
     }
 }
 
-/// A square that faces the stage.
-fn lamp(obj: &mut Obj) {
-    let normal = (STAGE - LAMP).normalize();
-    let x = DVec3::Y.cross(normal).normalize() * (LAMP_SIDE * 0.5);
-    let y = normal.cross(x);
-    obj.part("lamp", "lamp");
-    obj.quad([LAMP - x - y, LAMP + x - y, LAMP + x + y, LAMP - x + y]);
-}
-
-/// A strip bent to an arc that opens towards the lamp.
 fn with_strip(comment: &str) -> Obj {
     let mut obj = room(comment);
-    let (radius, height, thickness): (f64, f64, f64) = (0.34, 0.13, 0.004);
-    let away = STAGE - LAMP;
-    let middle = away.x.atan2(away.z);
-    let span = 0.5 * TAU;
-    let radial = |step: usize| {
-        let phi = middle + span * (step as f64 / SEGMENTS as f64 - 0.5);
-        dvec3(phi.sin(), 0.0, phi.cos())
-    };
-    let (low, high) = (DVec3::Y * 0.0005, DVec3::Y * height);
-    let inner = |step: usize| STAGE + radial(step) * radius;
-    let outer = |step: usize| STAGE + radial(step) * (radius + thickness);
-    obj.part("strip", "brass");
-    obj.sheet(SEGMENTS, |s| {
-        let s = SEGMENTS - s;
-        (inner(s) + low, inner(s) + high, -radial(s))
-    });
-    obj.sheet(SEGMENTS, |s| (outer(s) + low, outer(s) + high, radial(s)));
-    obj.sheet(SEGMENTS, |s| (outer(s) + high, inner(s) + high, DVec3::Y));
-    obj.quad([inner(0) + low, outer(0) + low, outer(0) + high, inner(0) + high]);
-    let s = SEGMENTS;
-    obj.quad([outer(s) + low, inner(s) + low, inner(s) + high, outer(s) + high]);
+    Strip { center: STAGE, opens_to: LAMP, radius: 0.34, height: 0.13, thickness: 0.004, segments: 240 }
+        .add(&mut obj, "strip", "brass");
     obj
 }

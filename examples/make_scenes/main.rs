@@ -2,9 +2,11 @@
 //! what this makes.
 
 mod obj;
+mod parts;
 
 mod caustic;
 mod cornell;
+mod furnished;
 
 use std::path::Path;
 
@@ -13,7 +15,15 @@ pub type File = (String, String);
 
 /// All files of all scenes.
 pub fn files() -> Vec<File> {
-    [cornell::files(), caustic::mirror(), caustic::mirror_aniso(), caustic::glass()].concat()
+    [
+        cornell::files(),
+        caustic::mirror(),
+        caustic::mirror_aniso(),
+        caustic::glass(),
+        furnished::glossy(),
+        furnished::specular(),
+    ]
+    .concat()
 }
 
 /// The three files of a scene.

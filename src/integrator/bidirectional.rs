@@ -1,10 +1,10 @@
 //! The bidirectional machine: light pass, vertex BVH, eye pass. What it does in each is a [`Recipe`].
 
-use super::Integrator;
 use super::merging;
 use super::recipe::{Base, Recipe};
 use super::records::Records;
 use super::tile::{self, Sample};
+use super::{Integrator, Size};
 use crate::connect::{self, EyeVertex};
 use crate::error::Result;
 use crate::film::Film;
@@ -37,7 +37,9 @@ pub struct Bidirectional<'a> {
     pub(super) settings: &'a Settings,
     recipe: Recipe,
     pub(super) techniques: Techniques,
-    pub(super) light_subpaths: u64,
+    pub(super) size: Size,
+    /// Light subpaths that the emission guide was learned from; 0 before.
+    pub(super) guided_by: u64,
     /// Radius of merging in the first iteration, world units.
     first_radius: f64,
     pub(super) cache: LightCache,
@@ -48,27 +50,19 @@ pub struct Bidirectional<'a> {
 impl<'a> Bidirectional<'a> {
     /// Prepares a recipe: a pre-pass over light subpaths sets the constants of roulette and weights.
     pub fn new(world: &'a World<'a>, settings: &'a Settings, recipe: Recipe) -> Result<Self> {
-        let film = &world.scene.film;
-        let samples = u64::from(film.width) * u64::from(film.height) * u64::from(settings.samples);
-        let light_subpaths = match (recipe.base, settings.light_subpaths) {
-            (Base::OwnPath, _) | (_, 0) => samples,
-            (_, n) => n,
-        };
         let mut machine = Self {
             world,
             settings,
             recipe,
             techniques: Techniques::none(settings.mis),
-            light_subpaths,
+            size: Size { samples: 0, light_subpaths: 0 },
+            guided_by: 0,
             first_radius: if recipe.merging { merging::first_radius(world, settings) } else { 0.0 },
             cache: LightCache::default(),
             bvh: VertexBvh::new(),
             records: Records::default(),
         };
-        if recipe.roulette && settings.guiding == Guiding::On && !machine.nothing_glossy() {
-            machine.techniques.guide = machine.learn_guide()?;
-        }
-        machine.techniques = machine.plan();
+        machine.resize(Size::of(settings, &world.scene.film))?;
         Ok(machine)
     }
 
@@ -82,14 +76,20 @@ impl<'a> Bidirectional<'a> {
         !self.world.scene.materials.iter().any(glossy)
     }
 
-    /// How often each technique tries, per eye sample.
-    pub(super) fn plan(&self) -> Techniques {
-        let (recipe, n_l) = (&self.recipe, self.light_subpaths as f64);
-        let eye_samples = f64::from(self.settings.samples);
+    /// Sets how often each technique tries, per eye sample.
+    pub(super) fn plan(&mut self) {
+        // Other uses of light vertices than the roulette want all of them.
+        self.techniques.storing = if self.recipe.roulette && !self.recipe.merging {
+            Storing { share: self.settings.storing, max_alpha: self.settings.hrr_alpha }
+        } else {
+            Storing::ALL
+        };
+        let (recipe, n_l) = (&self.recipe, self.size.light_subpaths as f64);
+        let eye_samples = f64::from(self.size.samples);
         // The weights must not depend on an iteration's own number of vertices, hence a pre-pass of its own numbers.
         let vertices = (n_l * self.vertices_per_subpath()).max(1.0);
         let on = |switch: bool, m: f64| if switch { m } else { 0.0 };
-        Techniques {
+        self.techniques = Techniques {
             heuristic: self.settings.mis,
             eye_hits: on(recipe.eye_subpaths, 1.0),
             next_event: on(recipe.next_event, 1.0),
@@ -102,19 +102,14 @@ impl<'a> Bidirectional<'a> {
             },
             // Of each iteration its own.
             merging: None,
-            // Other uses of light vertices than the roulette want all of them.
-            storing: if recipe.roulette && !recipe.merging {
-                Storing { share: self.settings.storing, max_alpha: self.settings.hrr_alpha }
-            } else {
-                Storing::ALL
-            },
+            storing: self.techniques.storing,
             guide: self.techniques.guide.clone(),
             roulette: recipe.roulette.then(|| Roulette {
                 light_subpaths: n_l / eye_samples,
                 constant: self.settings.expected * self.world.scene.mesh.total_area() / vertices,
                 max_alpha: self.settings.hrr_alpha,
             }),
-        }
+        };
     }
 
     fn vertices_per_subpath(&self) -> f64 {
@@ -151,18 +146,17 @@ impl<'a> Bidirectional<'a> {
         let mut tally = Tally { light_subpaths: subpaths.end - subpaths.start, ..Tally::default() };
         cache.clear();
         for index in subpaths {
-            let sampler = Sampler::new(self.settings.seed, iteration, stream, index);
+            let sampler =
+                Sampler::in_family(self.settings.seed, iteration, stream, index >> 32, index as u32);
             let mut walk = self.techniques.emit(world, &sampler);
             while let Some(light) = walk.filter(|light| light.depth < self.settings.max_depth) {
                 if !light.vertex.bsdf.is_delta() {
                     let stored = self.techniques.stored(&light);
-                    if self.keeps_vertices()
-                        && light.depth + more <= self.settings.max_depth
-                        && (stored == 1.0 || sampler.u1(light.depth, Purpose::Storing) < stored)
-                    {
+                    let kept = stored == 1.0 || sampler.u1(light.depth, Purpose::Storing) < stored;
+                    if kept && self.keeps_vertices() && light.depth + more <= self.settings.max_depth {
                         cache.push(&light);
                     }
-                    if let Some(film) = film.filter(|_| self.recipe.light_image)
+                    if let Some(film) = film.filter(|_| kept && self.recipe.light_image)
                         && let Some((raster, value, ray)) =
                             connect::connect_camera(world, &self.techniques, &light)
                         && tally.connection(!world.visibility.occluded(&ray))
@@ -188,14 +182,14 @@ impl<'a> Bidirectional<'a> {
         progress: &(dyn Fn(f64) + Sync),
     ) -> Tally {
         let done = AtomicU64::new(0);
-        let parts: Vec<(LightCache, Tally)> = (0..self.light_subpaths.div_ceil(CHUNK))
+        let parts: Vec<(LightCache, Tally)> = (0..self.size.light_subpaths.div_ceil(CHUNK))
             .into_par_iter()
             .map(|chunk| {
                 let mut cache = LightCache::default();
-                let range = chunk * CHUNK..((chunk + 1) * CHUNK).min(self.light_subpaths);
+                let range = chunk * CHUNK..((chunk + 1) * CHUNK).min(self.size.light_subpaths);
                 let tally = self.trace_light(stream, iteration, range, &mut cache, film);
                 let traced = done.fetch_add(tally.light_subpaths, Ordering::Relaxed) + tally.light_subpaths;
-                progress(traced as f64 / self.light_subpaths as f64);
+                progress(traced as f64 / self.size.light_subpaths as f64);
                 (cache, tally)
             })
             .collect();
@@ -283,12 +277,12 @@ impl<'a> Bidirectional<'a> {
                 if let Some((light, probability)) =
                     self.records.pick(vertex.walk.vertex.point.position, kind, u)
                 {
-                    let subpaths = self.settings.reused_subpaths.min(self.light_subpaths) as f64;
+                    let subpaths = self.settings.reused_subpaths.min(self.size.light_subpaths) as f64;
                     sum += self.connect_base(vertex, light, picks * subpaths * probability, clock, tally);
                 }
             } else if stored > 0 {
                 let light = self.cache.load(self.world, ((u * stored as f64) as usize).min(stored - 1));
-                let tries = picks * self.light_subpaths as f64 / stored as f64;
+                let tries = picks * self.size.light_subpaths as f64 / stored as f64;
                 sum += self.connect_base(vertex, &light, tries, clock, tally);
             }
         }
@@ -351,7 +345,7 @@ impl<'a> Bidirectional<'a> {
             if depth + 1 + self.cache.depth(index as usize) <= self.settings.max_depth {
                 let light = self.cache.load(self.world, index as usize);
                 let p = p * self.techniques.stored(&light);
-                let (m, tries) = (roulette.light_subpaths * p, self.light_subpaths as f64 * p);
+                let (m, tries) = (roulette.light_subpaths * p, self.size.light_subpaths as f64 * p);
                 let connection = vertex.connect(&self.techniques, &light, m, tries);
                 visit(index, self.if_visible(connection, clock, tally));
             }
@@ -360,28 +354,45 @@ impl<'a> Bidirectional<'a> {
 }
 
 impl Integrator for Bidirectional<'_> {
+    fn resize(&mut self, size: Size) -> Result<()> {
+        let film = &self.world.scene.film;
+        let all = u64::from(film.width) * u64::from(film.height) * u64::from(size.samples);
+        self.size = Size {
+            light_subpaths: if self.recipe.base == Base::OwnPath { all } else { size.light_subpaths },
+            ..size
+        };
+        if self.recipe.roulette && self.settings.guiding == Guiding::On && !self.nothing_glossy() {
+            self.learn_guide()?;
+        }
+        self.plan();
+        Ok(())
+    }
+
     fn iterate(&mut self, iteration: u64, film: &mut Film, progress: &(dyn Fn(f64) + Sync)) -> Result<Tally> {
+        let start = Instant::now();
         self.techniques.merging = (self.first_radius > 0.0).then(|| Merging {
-            light_subpaths: self.light_subpaths as f64,
+            light_subpaths: self.size.light_subpaths as f64,
             radius: merging::radius(self.first_radius, self.settings.merge_shrink, iteration),
         });
         let on_light_side = |fraction| progress(LIGHT_SHARE * fraction);
         let mut tally = self.light_pass(Stream::Light, iteration, Some(film), &on_light_side);
         if self.recipe.roulette || self.recipe.merging {
-            let start = Instant::now();
+            let build = Instant::now();
             self.bvh.build(self.cache.positions())?;
-            tally.vertex_bvh_build += start.elapsed().as_secs_f64();
+            tally.vertex_bvh_build += build.elapsed().as_secs_f64();
         }
         if self.recipe.base == Base::Probabilistic {
             let (world, cache) = (self.world, &self.cache);
             self.records = Records::new(world, self.settings, &self.techniques, cache, iteration, &mut tally);
         }
-        let key = (self.settings.seed, iteration, self.settings.samples);
+        tally.sides[0] = start.elapsed().as_secs_f64();
+        let (start, key) = (Instant::now(), (self.settings.seed, iteration, self.size.samples));
         let on_eye_side = |fraction| progress(LIGHT_SHARE + (1.0 - LIGHT_SHARE) * fraction);
         tally.add(&tile::sample_film(film, key, &on_eye_side, |sample, clock, tally| {
             self.radiance(sample, clock, tally)
         }));
-        film.count_samples(u64::from(self.settings.samples));
+        tally.sides[1] = start.elapsed().as_secs_f64();
+        film.count_samples(u64::from(self.size.samples));
         Ok(tally)
     }
 

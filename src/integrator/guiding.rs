@@ -16,19 +16,27 @@ use std::sync::Arc;
 /// Light subpaths of the pre-pass, and eye subpaths: an eighth of an iteration's, within these bounds.
 const LIGHT_SUBPATHS: (u64, u64) = (1 << 12, 1 << 18);
 const EYE_SUBPATHS: (u64, u64) = (1 << 12, 1 << 17);
+/// How much larger a pre-pass must be to be worth its while after another.
+const GROWTH: u64 = 4;
 /// Eye subpaths of one task.
 const CHUNK: u64 = 1024;
 
 impl Bidirectional<'_> {
-    /// Learns from a pre-pass. It depends on the seed and the settings alone, so that all iterations share its result
-    /// and can be added up.
-    pub(super) fn learn_guide(&mut self) -> Result<Option<Arc<EmissionGuide>>> {
-        let all = self.light_subpaths;
+    /// Learns from a pre-pass, unless one of about the size that is due has been learned from before. It depends on the
+    /// seed and the size alone, so that iterations of one size share its result and can be added up.
+    pub(super) fn learn_guide(&mut self) -> Result<()> {
+        let size = self.size;
         let film = &self.world.scene.film;
-        let samples = u64::from(film.width) * u64::from(film.height) * u64::from(self.settings.samples);
+        let samples = u64::from(film.width) * u64::from(film.height) * u64::from(size.samples);
         let eye_subpaths = (samples / 8).clamp(EYE_SUBPATHS.0, EYE_SUBPATHS.1);
-        self.light_subpaths = (all / 8).clamp(LIGHT_SUBPATHS.0, LIGHT_SUBPATHS.1);
-        self.techniques = self.plan();
+        let light_subpaths = (size.light_subpaths / 8).clamp(LIGHT_SUBPATHS.0, LIGHT_SUBPATHS.1);
+        if light_subpaths < GROWTH * self.guided_by {
+            return Ok(());
+        }
+        self.guided_by = light_subpaths;
+        self.size.light_subpaths = light_subpaths;
+        self.techniques.guide = None;
+        self.plan();
         self.light_pass(Stream::GuideLight, 0, None, &|_| ());
         self.bvh.build(self.cache.positions())?;
         // Collected in order: sums must not depend on threads.
@@ -43,13 +51,13 @@ impl Bidirectional<'_> {
         let (world, seed) = (self.world, self.settings.seed);
         let observations = found.into_iter().flatten().filter_map(|(vertex, score)| {
             let subpath = self.cache.subpath_of(vertex as usize) as u64;
-            let sampler = Sampler::new(seed, 0, Stream::GuideLight, subpath);
+            let sampler = Sampler::in_family(seed, 0, Stream::GuideLight, subpath >> 32, subpath as u32);
             let (emitter, direction) = from_light::start(world, None, &sampler)?;
             Some((emitter, direction, score))
         });
-        let guide = EmissionGuide::learn(&world.lights, observations);
-        self.light_subpaths = all;
-        Ok(guide.map(Arc::new))
+        self.techniques.guide = EmissionGuide::learn(&world.lights, observations).map(Arc::new);
+        self.size = size;
+        Ok(())
     }
 
     /// What light vertices give to an eye subpath through the roulette.

@@ -12,13 +12,40 @@ mod tile;
 pub use recipe::Recipe;
 
 use crate::error::Result;
-use crate::film::Film;
+use crate::film::{Film, FilmSettings};
 use crate::settings::Settings;
 use crate::subpath::World;
 use crate::tally::Tally;
 
+/// How large an iteration is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Size {
+    /// Eye samples of each pixel, at least 1.
+    pub samples: u32,
+    /// Light subpaths; without meaning to integrators that have none.
+    pub light_subpaths: u64,
+}
+
+impl Size {
+    /// What the settings say; where they leave it open, one sample, and as many light subpaths as eye samples.
+    pub fn of(settings: &Settings, film: &FilmSettings) -> Self {
+        let samples = settings.samples.max(1);
+        let all = u64::from(film.width) * u64::from(film.height) * u64::from(samples);
+        Self {
+            samples,
+            light_subpaths: if settings.light_subpaths == 0 { all } else { settings.light_subpaths },
+        }
+    }
+}
+
 /// An algorithm with the memory that it keeps between iterations.
 pub trait Integrator {
+    /// Makes iterations to come of this size, instead of [`Size::of`] the settings.
+    ///
+    /// # Errors
+    /// As [`new`].
+    fn resize(&mut self, size: Size) -> Result<()>;
+
     /// Runs one iteration and adds it to the film, its samples counted. The result depends on the seed and the
     /// iteration's number alone. `progress` is told the finished fraction now and then, from any thread.
     fn iterate(&mut self, iteration: u64, film: &mut Film, progress: &(dyn Fn(f64) + Sync)) -> Result<Tally>;

@@ -1,8 +1,8 @@
 //! Path tracing with next-event estimation: code of its own, so that it can bear witness against the bidirectional
 //! machine.
 
-use super::Integrator;
 use super::tile::{self, Sample};
+use super::{Integrator, Size};
 use crate::bsdf::Transport;
 use crate::error::Result;
 use crate::film::Film;
@@ -12,17 +12,19 @@ use crate::settings::Settings;
 use crate::subpath::{Vertex, World};
 use crate::tally::{Clock, Tally};
 use crate::visibility::{Ray, offset};
+use std::time::Instant;
 
 /// The path tracer.
 pub struct PathTracer<'a> {
     world: &'a World<'a>,
     settings: &'a Settings,
+    samples: u32,
 }
 
 impl<'a> PathTracer<'a> {
     /// A path tracer for a world.
     pub fn new(world: &'a World<'a>, settings: &'a Settings) -> Self {
-        Self { world, settings }
+        Self { world, settings, samples: Size::of(settings, &world.scene.film).samples }
     }
 
     fn radiance(&self, sample: &Sample, clock: Clock, tally: &mut Tally) -> Spectrum {
@@ -91,12 +93,19 @@ impl<'a> PathTracer<'a> {
 }
 
 impl Integrator for PathTracer<'_> {
+    fn resize(&mut self, size: Size) -> Result<()> {
+        self.samples = size.samples;
+        Ok(())
+    }
+
     fn iterate(&mut self, iteration: u64, film: &mut Film, progress: &(dyn Fn(f64) + Sync)) -> Result<Tally> {
-        let key = (self.settings.seed, iteration, self.settings.samples);
-        let tally = tile::sample_film(film, key, progress, |sample, clock, tally| {
+        let key = (self.settings.seed, iteration, self.samples);
+        let start = Instant::now();
+        let mut tally = tile::sample_film(film, key, progress, |sample, clock, tally| {
             self.radiance(sample, clock, tally)
         });
-        film.count_samples(u64::from(self.settings.samples));
+        tally.sides[1] = start.elapsed().as_secs_f64();
+        film.count_samples(u64::from(self.samples));
         Ok(tally)
     }
 }

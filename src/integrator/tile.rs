@@ -46,9 +46,10 @@ pub fn sample_film(
             Clock::sampled(0, 1).time(&mut seconds, || {
                 for y in top..(top + SIDE).min(height) {
                     for x in left..(left + SIDE).min(width) {
-                        let first = (u64::from(y) * u64::from(width) + u64::from(x)) * u64::from(samples);
-                        let values = (first..first + u64::from(samples)).map(|index| {
-                            let sampler = Sampler::new(seed, iteration, Stream::Eye, index);
+                        let pixel = u64::from(y) * u64::from(width) + u64::from(x);
+                        let values = (0..samples).map(|n| {
+                            let index = pixel * u64::from(samples) + u64::from(n);
+                            let sampler = Sampler::in_family(seed, iteration, Stream::Eye, pixel, n);
                             let raster = DVec2::new(x.into(), y.into()) + sampler.u2(0, Purpose::Raster);
                             let sample = Sample { raster, index, sampler };
                             (raster, radiance(&sample, clock, &mut tally))

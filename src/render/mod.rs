@@ -3,6 +3,7 @@
 pub mod counters;
 pub mod noise;
 pub mod observer;
+mod sizing;
 
 pub use counters::{Counters, Memory, Seconds, Stats};
 pub use noise::{ErrorEstimate, Noise};
@@ -10,11 +11,12 @@ pub use observer::{Observer, Progress, Silent};
 
 use crate::error::{Error, Result};
 use crate::film::Film;
-use crate::integrator;
+use crate::integrator::{self, Size};
 use crate::scene::Scene;
 use crate::settings::{Integrator, Settings};
 use crate::subpath::World;
 use crate::tally::Tally;
+use sizing::{Measured, Sizing};
 use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Instant;
@@ -28,6 +30,8 @@ pub struct Outcome {
     pub stats: Stats,
     /// What the iterations' scatter tells of the error.
     pub noise: Noise,
+    /// Sizes that were chosen for iterations, with what each counts for; empty where the settings say them.
+    pub sizes: Vec<(Size, u32)>,
     /// Whether the observer ended it.
     pub interrupted: bool,
 }
@@ -54,6 +58,9 @@ fn run(scene: &Scene, settings: &Settings, observer: &dyn Observer) -> Result<Ou
     if world.lights.is_empty() {
         observer.warn("nothing in the scene emits light: the image is black");
     }
+    let mut size = Size::of(&settings, &scene.film);
+    let sizing = Sizing::new(&settings, &scene.film);
+    let mut sizes: Vec<(Size, u32)> = sizing.iter().map(|_| (size, 1)).collect();
     let mut integrator = integrator::new(&world, &settings)?;
     let mut film = Film::new(&scene.film);
     let mut tally = Tally::default();
@@ -92,12 +99,21 @@ fn run(scene: &Scene, settings: &Settings, observer: &dyn Observer) -> Result<Ou
             });
         };
         progress(0.0);
-        tally.add(&integrator.iterate(settings.first_iteration + finished, &mut film, &progress)?);
+        let done = integrator.iterate(settings.first_iteration + finished, &mut film, &progress)?;
+        tally.add(&done);
         finished += 1;
         noise.update(&film, finished, false);
         accepted.store(tally.roulette.accepted, Ordering::Relaxed);
         let (cache, tree) = integrator.bytes();
         bytes = (bytes.0.max(cache), bytes.1.max(tree));
+        if let Some(sizing) = &sizing {
+            let measured = Measured { size, tally: done, bytes: cache + tree };
+            let Some((next, weight)) = sizing.next(start.elapsed().as_secs_f64(), &measured) else { break };
+            size = next;
+            integrator.resize(size)?;
+            film.set_weight(weight);
+            sizes.push((size, weight));
+        }
     }
     noise.update(&film, finished, true);
     let render = start.elapsed().as_secs_f64();
@@ -146,7 +162,8 @@ fn run(scene: &Scene, settings: &Settings, observer: &dyn Observer) -> Result<Ou
             vertex_bvh_bytes: bytes.1 as u64,
         },
     };
-    Ok(Outcome { film, stats, noise, interrupted })
+    sizes.truncate(usize::try_from(finished).unwrap_or(usize::MAX));
+    Ok(Outcome { film, stats, noise, sizes, interrupted })
 }
 
 /// What `auto` stands for: the least machinery that finds all of the scene's light.

@@ -2,7 +2,7 @@
 //! scatter tells the variance of their mean.
 //!
 //! Iterations are taken together in groups, which grow with their number, so that this costs next to nothing. A group of
-//! weight w (its samples) and mean x adds `(x - m)^2 w W / (w + W)` to each pixel's sum of squares, m and W the mean and
+//! weight w (its samples' weights) and mean x adds `(x - m)^2 w W / (w + W)` to each pixel's sum of squares, m and W the mean and
 //! weight before it [Welford 1962; West 1979]. Each of these terms has the variance of one sample as its mean, whatever
 //! the sizes of the groups, and over their number it estimates it.
 
@@ -85,7 +85,7 @@ pub struct Noise {
     grid: Tiles,
     pixels: Moments,
     tiles: Moments,
-    /// Samples per pixel that have been taken in.
+    /// What the samples of a pixel that have been taken in count for.
     samples: u64,
     /// Iterations that have been taken in.
     iterations: u64,
@@ -125,13 +125,13 @@ impl Noise {
         let fresh = iterations - self.iterations;
         if fresh == 0
             || (!last && fresh < (self.iterations / GROUPS).max(1))
-            || film.samples() == self.samples
+            || film.weights() == self.samples
         {
             return;
         }
-        let (before, weight) = (self.samples as f64, (film.samples() - self.samples) as f64);
+        let (before, weight) = (self.samples as f64, (film.weights() - self.samples) as f64);
         let deviations = self.take_in(film, before, weight);
-        (self.samples, self.iterations) = (film.samples(), iterations);
+        (self.samples, self.iterations) = (film.weights(), iterations);
         self.groups += 1;
         if before > 0.0 {
             self.look_at(deviations);

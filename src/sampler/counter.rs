@@ -3,6 +3,7 @@
 //! A number is a pure function of its key: the same for any thread count and order of work, and switching one
 //! technique off does not shift the numbers of another.
 
+use super::sobol;
 use glam::DVec2;
 
 /// Mixes 64 bits so that every input bit reaches every output bit [Stafford 2011, variant 13].
@@ -67,16 +68,38 @@ pub enum Purpose {
     Roulette,
 }
 
+impl Purpose {
+    /// Whether few numbers of it decide much, so that it pays to spread them evenly.
+    #[inline(always)]
+    fn is_even(self) -> bool {
+        use Purpose::*;
+        matches!(self, Raster | Lens | LightPick | LightPoint | LightDirection | Lobe | Direction | Survival)
+    }
+}
+
+/// Depths up to this one have their numbers spread evenly over a family. Deeper, too little depends on one number alone.
+const EVEN_DEPTHS: u32 = 3;
+
 /// The random numbers of one subpath.
 #[derive(Debug, Clone, Copy)]
 pub struct Sampler {
     key: u64,
+    /// Key of the family, and the place in it; `None`: all numbers are independent.
+    family: Option<(u64, u32)>,
 }
 
 impl Sampler {
-    /// Numbers of the subpath `index` of a stream in an iteration.
+    /// Independent numbers for the subpath `index` of a stream in an iteration.
     pub fn new(seed: u64, iteration: u64, stream: Stream, index: u64) -> Self {
-        Self { key: combine(combine(combine(seed, iteration), stream as u64), index) }
+        Self { key: combine(combine(combine(seed, iteration), stream as u64), index), family: None }
+    }
+
+    /// Numbers for the subpath `index` of a family (the samples of a pixel, the light subpaths of an iteration): those
+    /// that choose positions, directions and lights near its start are spread evenly over the family [`sobol`], which
+    /// lowers its noise; each subpath's own are as uniform and independent as ever.
+    pub fn in_family(seed: u64, iteration: u64, stream: Stream, family: u64, index: u32) -> Self {
+        let family = combine(combine(combine(seed, iteration), stream as u64), family);
+        Self { key: combine(family, !u64::from(index)), family: Some((family, index)) }
     }
 
     /// 64 random bits for a purpose at a depth (vertex number along the subpath).
@@ -85,17 +108,39 @@ impl Sampler {
         combine(self.key, (u64::from(depth) << 8) | purpose as u64)
     }
 
+    /// The key of a purpose in the family, and the place there, where numbers are spread evenly.
+    #[inline(always)]
+    fn even(&self, depth: u32, purpose: Purpose) -> Option<(u64, u32)> {
+        match self.family {
+            Some((family, index)) if depth <= EVEN_DEPTHS && purpose.is_even() => {
+                Some((combine(family, (u64::from(depth) << 8) | purpose as u64), index))
+            }
+            _ => None,
+        }
+    }
+
     /// Uniform in [0,1), 53 bits.
     #[inline(always)]
     pub fn u1(&self, depth: u32, purpose: Purpose) -> f64 {
-        unit(self.bits(depth, purpose))
+        let bits = self.bits(depth, purpose);
+        match self.even(depth, purpose) {
+            Some((key, index)) => refined(sobol::point1(index, key), bits),
+            None => unit(bits),
+        }
     }
 
     /// Two independent uniforms in [0,1).
     #[inline(always)]
     pub fn u2(&self, depth: u32, purpose: Purpose) -> DVec2 {
         let a = self.bits(depth, purpose);
-        DVec2::new(unit(a), unit(mix(a ^ 0x6a09_e667_f3bc_c908)))
+        let b = mix(a ^ 0x6a09_e667_f3bc_c908);
+        match self.even(depth, purpose) {
+            Some((key, index)) => {
+                let [x, y] = sobol::point2(index, [key, mix(key ^ 0x3c6e_f372_fe94_f82b)]);
+                DVec2::new(refined(x, a), refined(y, b))
+            }
+            None => DVec2::new(unit(a), unit(b)),
+        }
     }
 
     /// The `n`-th of any number of uniforms for a purpose.
@@ -103,6 +148,12 @@ impl Sampler {
     pub fn nth(&self, depth: u32, purpose: Purpose, n: u32) -> f64 {
         unit(combine(self.bits(depth, purpose), u64::from(n)))
     }
+}
+
+/// A fraction of 2^32 with 21 more bits below, as a number in [0,1).
+#[inline(always)]
+fn refined(fraction: u32, bits: u64) -> f64 {
+    unit((u64::from(fraction) << 32) | (bits >> 32))
 }
 
 /// The top 53 bits as a number in [0,1).
@@ -114,6 +165,24 @@ pub fn unit(bits: u64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn families_are_spread_evenly_where_it_matters() {
+        for (depth, purpose, even) in
+            [(1, Purpose::Direction, true), (1, Purpose::CachePick, false), (9, Purpose::Direction, false)]
+        {
+            let hit = |family: u64| {
+                let mut seen = [false; 64];
+                for index in 0..64 {
+                    let u = Sampler::in_family(3, 1, Stream::Eye, family, index).u2(depth, purpose);
+                    seen[(u.x * 8.0) as usize * 8 + (u.y * 8.0) as usize] = true;
+                }
+                seen.iter().filter(|&&s| s).count()
+            };
+            let full = (0..20).filter(|&family| hit(family) == 64).count();
+            assert_eq!(full, if even { 20 } else { 0 }, "{depth} {purpose:?}");
+        }
+    }
 
     #[test]
     fn streams_and_purposes_do_not_share_numbers() {

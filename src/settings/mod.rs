@@ -20,6 +20,8 @@ pub struct Settings {
     pub visibility: Backend,
     /// Iterations to run (each `samples` eye samples per pixel).
     pub iterations: u64,
+    /// Most memory for light vertices where they are not set, 1e9 bytes; 0 = half of the machine's.
+    pub memory: f64,
     /// First iteration's number, so that a render can be split and added up.
     pub first_iteration: u64,
     /// Seconds of rendering instead of a number of iterations.
@@ -31,9 +33,9 @@ pub struct Settings {
     pub seed: u64,
     /// Threads; 0 = all.
     pub threads: usize,
-    /// Eye samples per pixel and iteration.
+    /// Eye samples per pixel and iteration; 0 = what suits the time, else 1.
     pub samples: u32,
-    /// Light subpaths per iteration; 0 = as many as pixels.
+    /// Light subpaths per iteration; 0 = what suits time and memory, else as many as eye samples.
     pub light_subpaths: u64,
     /// Connections that the uniform picks (`lvc`) try at each eye vertex.
     pub connections: u32,
@@ -66,12 +68,13 @@ impl Default for Settings {
             max_depth: 24,
             visibility: Backend::BEST,
             iterations: 64,
+            memory: 0.0,
             first_iteration: 0,
             time: None,
             error: None,
             seed: 0,
             threads: 0,
-            samples: 1,
+            samples: 0,
             light_subpaths: 0,
             connections: 1,
             expected: 1.0,

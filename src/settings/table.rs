@@ -43,16 +43,16 @@ pub const TABLE: &[Setting] = &[
     Setting {
         name: "samples",
         kind: Kind::Integer {
-            min: 1,
+            min: 0,
             max: 65535,
             get: |s| s.samples.into(),
             set: |s, v| s.samples = v as u32,
         },
-        default: "1",
+        default: "0",
         value_name: "N",
         heading: TRANSPORT,
-        help: "Eye samples per pixel in each iteration",
-        doc: "",
+        help: "Eye samples per pixel in each iteration; 0: what suits",
+        doc: "0: with --time, as many as the time allows, in few large iterations; else 1.",
     },
     Setting {
         name: "light_subpaths",
@@ -65,8 +65,9 @@ pub const TABLE: &[Setting] = &[
         default: "0",
         value_name: "N",
         heading: TRANSPORT,
-        help: "Light subpaths in each iteration; 0: as many as pixels",
-        doc: "",
+        help: "Light subpaths in each iteration; 0: what suits",
+        doc: "0: with --time and the roulette (+hrr), as many as take as long as the eye samples and fit the memory; else \
+              as many as eye samples.",
     },
     Setting {
         name: "connections",
@@ -249,6 +250,15 @@ pub const TABLE: &[Setting] = &[
               mean luminance of the 16 x 16 pixels around it, eps a hundredth of the image's. It is told from how the \
               iterations differ, and the render stops when it is below ERROR with 90 % confidence, or when --time is up. \
               It tells noise: neither the blur of vertex merging nor light that no iteration has found yet.",
+    },
+    Setting {
+        name: "memory",
+        kind: Kind::Real { min: 0.0, max: 1e6, get: |s| Some(s.memory), set: |s, v| s.memory = v },
+        default: "0.0",
+        value_name: "GB",
+        heading: MACHINE,
+        help: "Most memory that light vertices may take, 1e9 bytes; 0: half of the machine's",
+        doc: "Where the renderer chooses the size of iterations, none has more light subpaths than fit.",
     },
     Setting {
         name: "first_iteration",

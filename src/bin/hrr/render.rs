@@ -8,6 +8,7 @@ use clap::builder::ValueHint;
 use clap::{Arg, ArgAction, ArgMatches, value_parser};
 use hrr::file;
 use hrr::image::{self, Attributes, Format};
+use hrr::integrator::Size;
 use hrr::render::counters::{Stats, peak_rss_bytes};
 use hrr::render::noise::LEAST_HILL;
 use hrr::render::{ErrorEstimate, Noise};
@@ -145,7 +146,10 @@ pub fn run(args: &RenderArgs, log: &Log) -> Result<u8> {
     stats.seconds.load = load;
     let image = outcome.film.image();
     let error = outcome.noise.error();
-    let attributes = attributes(&scene, &settings, &stats, outcome.film.samples(), error);
+    let mut attributes = attributes(&scene, &settings, &stats, outcome.film.samples(), error);
+    if !outcome.sizes.is_empty() {
+        attributes.set("hrr:sizes", sizes(&outcome.sizes));
+    }
     // One bad disk does not keep the image from the others.
     let written = args.outputs.iter().map(|path| match Format::of(path)? {
         Format::Exr => image::write(path, &image, &attributes),
@@ -160,6 +164,9 @@ pub fn run(args: &RenderArgs, log: &Log) -> Result<u8> {
     written.into_iter().chain([variance, reported]).collect::<Result<()>>()?;
 
     details(&stats, log);
+    if !outcome.sizes.is_empty() {
+        log.detail(format_args!("{:>20}  {}", "sizes", sizes(&outcome.sizes)));
+    }
     summary(args, &stats, error, outcome.interrupted, log);
     let missed = judge(&settings, error, &stats.integrator, log);
     Ok(match (outcome.interrupted, missed) {
@@ -255,6 +262,13 @@ fn write_variance(path: &Path, noise: &Noise, attributes: &Attributes) -> Result
         message: "one iteration tells no variance; run at least two".into(),
     })?;
     image::write(path, &variance, attributes)
+}
+
+/// Samples x light subpaths of each iteration, and what it counts for.
+fn sizes(sizes: &[(Size, u32)]) -> String {
+    let words: Vec<String> =
+        sizes.iter().map(|(s, weight)| format!("{}x{}*{weight}", s.samples, s.light_subpaths)).collect();
+    words.join(" ")
 }
 
 fn is_stdout(path: &Path) -> bool {

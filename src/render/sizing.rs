@@ -1,0 +1,228 @@
+//! How large each iteration is, where the settings leave it open and time decides when to end.
+//!
+//! With the roulette, the pairs that are judged are eye samples times light vertices, while the time is their *sum*:
+//! noise falls with the product, so one large iteration beats many small ones, and both sides deserve half of the time.
+//! A preview comes first, then a pilot that is large enough to measure costs by, then what is left of the time, in as few
+//! iterations as the memory allows. Iterations count by their light subpaths times their samples.
+
+use super::counters::machine_bytes;
+use crate::film::FilmSettings;
+use crate::integrator::{Recipe, Size, recipe::Base};
+use crate::settings::Settings;
+use crate::tally::Tally;
+
+/// Share of the time that the pilot takes, and bounds in seconds.
+const PILOT: (f64, f64, f64) = (0.04, 0.2, 10.0);
+/// Share of the time that is not worth another iteration.
+const REST: f64 = 0.02;
+/// Where only the number of samples is open, iterations to divide the time into: so that there is something to show.
+const PARTS: f64 = 8.0;
+/// Samples up to which probabilistic connections, whose light subpaths are few, stay useful in one iteration.
+const REUSED_SAMPLES: f64 = 8.0;
+/// What a cache takes while it is filled, over what it takes then.
+const WHILE_FILLING: f64 = 2.0;
+
+/// What is open.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Open {
+    Samples,
+    LightSubpaths,
+    Both,
+}
+
+/// Chooses the sizes of iterations.
+#[derive(Debug, Clone)]
+pub(super) struct Sizing {
+    open: Open,
+    /// Whether noise falls with the product of both sides.
+    pairs: bool,
+    most_samples: f64,
+    time: f64,
+    memory: f64,
+    light_subpaths_per_sample: f64,
+    preview: Size,
+}
+
+/// What an iteration was measured to take.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Measured {
+    /// Its size.
+    pub size: Size,
+    /// Its costs.
+    pub tally: Tally,
+    /// Bytes of light vertices and their tree.
+    pub bytes: usize,
+}
+
+impl Sizing {
+    /// `None` when the settings say it all: sizes, or a number of iterations.
+    pub(super) fn new(settings: &Settings, film: &FilmSettings) -> Option<Self> {
+        let time = settings.time?;
+        if settings.error.is_some() {
+            return None; // the error is told from how iterations of one kind differ
+        }
+        let recipe = Recipe::of(settings.integrator);
+        if recipe.is_some_and(|r| r.merging) {
+            return None; // its radius shrinks from iteration to iteration: it needs many
+        }
+        let pairs = recipe.is_some_and(|r| r.roulette);
+        let open = match (settings.samples, settings.light_subpaths, pairs) {
+            (0, 0, true) => Open::Both,
+            (0, _, _) => Open::Samples,
+            (_, 0, true) => Open::LightSubpaths,
+            _ => return None,
+        };
+        let reused = recipe.is_some_and(|r| r.base == Base::Probabilistic);
+        let bytes = if settings.memory > 0.0 { settings.memory * 1e9 } else { machine_bytes() as f64 / 2.0 };
+        Some(Self {
+            open,
+            pairs,
+            most_samples: if reused { REUSED_SAMPLES } else { 65535.0 },
+            time,
+            memory: bytes,
+            light_subpaths_per_sample: f64::from(film.width) * f64::from(film.height),
+            preview: Size::of(settings, film),
+        })
+    }
+
+    /// The size of the next iteration after the last one, and what it counts for; `None` when the time is up.
+    pub(super) fn next(&self, elapsed: f64, last: &Measured) -> Option<(Size, u32)> {
+        let left = self.time - elapsed;
+        if left < REST * self.time {
+            return None;
+        }
+        let [light, eye] = last.tally.sides;
+        let took = (light + eye).max(1e-9);
+        let pilot = (PILOT.0 * self.time).clamp(PILOT.1, PILOT.2);
+        let mut seconds = if took < 0.25 * pilot { pilot.min(left) } else { left };
+        if self.open == Open::Samples {
+            seconds = seconds.min((self.time / PARTS).max(pilot));
+        }
+        if left - seconds < 0.25 * seconds {
+            seconds = left;
+        }
+        let per_subpath = light / last.size.light_subpaths.max(1) as f64;
+        let per_sample = (eye / f64::from(last.size.samples)).max(1e-9);
+        let size = match self.open {
+            Open::Both => {
+                let subpaths = self.most_subpaths(last).min(0.5 * seconds / per_subpath.max(1e-12)).max(1.0);
+                // Equal times, also where memory is short.
+                self.size(subpaths * per_subpath / per_sample, subpaths)
+            }
+            Open::LightSubpaths => {
+                let eye_side = per_sample * f64::from(last.size.samples);
+                let subpaths =
+                    ((seconds - eye_side).max(0.5 * seconds.min(eye_side)) / per_subpath.max(1e-12)).max(1.0);
+                Size { light_subpaths: subpaths.min(self.most_subpaths(last)) as u64, ..last.size }
+            }
+            // Light subpaths that were not set follow the samples, as in the preview.
+            Open::Samples => {
+                let follow = self.preview.light_subpaths as f64 == self.light_subpaths_per_sample;
+                let light_per_sample =
+                    if follow { self.light_subpaths_per_sample * per_subpath } else { 0.0 };
+                let fixed = if follow { 0.0 } else { light };
+                let samples = (seconds - fixed).max(0.0) / (per_sample + light_per_sample);
+                let subpaths = if follow {
+                    samples * self.light_subpaths_per_sample
+                } else {
+                    self.preview.light_subpaths as f64
+                };
+                self.size(samples, subpaths)
+            }
+        };
+        let weight = size.light_subpaths as f64 / self.preview.light_subpaths.max(1) as f64;
+        Some((
+            size,
+            if self.pairs && self.open != Open::Samples { weight.round().clamp(1.0, 1e6) as u32 } else { 1 },
+        ))
+    }
+
+    fn size(&self, samples: f64, subpaths: f64) -> Size {
+        let samples = samples.round().clamp(1.0, self.most_samples) as u32;
+        Size { samples, light_subpaths: (subpaths as u64).max(1) }
+    }
+
+    /// How many light subpaths fit the memory, and a tree.
+    fn most_subpaths(&self, last: &Measured) -> f64 {
+        let bytes = last.bytes as f64 / last.size.light_subpaths.max(1) as f64;
+        // A tree's vertices are counted in 31 bits; a subpath leaves a few.
+        (self.memory / (WHILE_FILLING * bytes).max(1e-3)).min((1u64 << 29) as f64)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::settings::Integrator;
+
+    const FILM: FilmSettings = FilmSettings { width: 100, height: 100, filter: crate::film::Filter::Box };
+
+    /// Plays a render with given costs; the sizes and the time it took.
+    fn play(
+        settings: &Settings,
+        per_subpath: f64,
+        per_sample: f64,
+        vertex_bytes: f64,
+    ) -> (Vec<(Size, u32)>, f64) {
+        let sizing = Sizing::new(settings, &FILM).unwrap();
+        let (mut size, mut elapsed, mut sizes) = (Size::of(settings, &FILM), 0.0, Vec::new());
+        loop {
+            let sides = [per_subpath * size.light_subpaths as f64, per_sample * f64::from(size.samples)];
+            elapsed += sides[0] + sides[1];
+            let bytes = (vertex_bytes * size.light_subpaths as f64) as usize;
+            let last = Measured { size, tally: Tally { sides, ..Tally::default() }, bytes };
+            match sizing.next(elapsed, &last) {
+                Some(next) => sizes.push(next),
+                None => return (sizes, elapsed),
+            }
+            size = sizes.last().unwrap().0;
+            assert!(sizes.len() < 1000);
+        }
+    }
+
+    fn timed(integrator: Integrator) -> Settings {
+        Settings { integrator, time: Some(40.0), memory: 1.0, ..Settings::default() }
+    }
+
+    #[test]
+    fn the_roulette_gets_one_large_iteration_with_equal_sides() {
+        let (sizes, took) = play(&timed(Integrator::LvcHrr), 1e-6, 0.05, 20.0);
+        assert!((took / 40.0 - 1.0).abs() < 0.03, "{took}");
+        let (last, weight) = sizes[1];
+        assert_eq!(sizes.len(), 2, "{sizes:?}");
+        assert!((last.light_subpaths as f64 * 1e-6 / (f64::from(last.samples) * 0.05) - 1.0).abs() < 0.02);
+        assert!(last.light_subpaths > 18_000_000 && weight > 1800);
+    }
+
+    #[test]
+    fn memory_bounds_light_subpaths_and_makes_more_iterations() {
+        let (sizes, took) = play(&timed(Integrator::LvcHrr), 1e-6, 0.05, 100.0);
+        let most = 1e9 / 200.0;
+        assert!(sizes.iter().all(|(s, _)| s.light_subpaths as f64 <= most), "{sizes:?}");
+        assert!(sizes.len() >= 4 && (took / 40.0 - 1.0).abs() < 0.05, "{took} {sizes:?}");
+    }
+
+    #[test]
+    fn path_tracing_shows_parts() {
+        let (sizes, took) = play(&timed(Integrator::Pt), 0.0, 0.05, 0.0);
+        assert!(sizes.len() >= 8 && sizes.iter().all(|&(_, w)| w == 1), "{sizes:?}");
+        assert!((took / 40.0 - 1.0).abs() < 0.05, "{took}");
+    }
+
+    #[test]
+    fn what_is_set_stays() {
+        let fixed = |samples, light_subpaths| {
+            let settings = Settings { samples, light_subpaths, ..timed(Integrator::LvcHrr) };
+            Sizing::new(&settings, &FILM).is_none() || {
+                let (sizes, _) = play(&settings, 1e-6, 0.05, 30.0);
+                sizes.iter().all(|(s, _)| {
+                    (samples == 0 || s.samples == samples)
+                        && (light_subpaths == 0 || s.light_subpaths == light_subpaths)
+                })
+            }
+        };
+        assert!(fixed(3, 5000) && fixed(0, 5000) && fixed(3, 0));
+        let untimed = Settings { time: None, ..timed(Integrator::LvcHrr) };
+        assert!(Sizing::new(&untimed, &FILM).is_none());
+    }
+}
