@@ -22,4 +22,5 @@ mod layers;
 mod mis;
 mod flip;
 mod report;
+mod study;
 mod ffi;

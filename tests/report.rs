@@ -153,3 +153,50 @@ fn no_promise_is_made_where_rare_samples_decide() {
         assert_eq!(error.is_sure(), sure, "{integrator:?} {error:?}");
     }
 }
+
+#[test]
+fn a_reference_is_two_renders_that_agree() {
+    let place = Place::new();
+    let (code, out, err) =
+        place.run("reference scene.toml -o ref --size 32x32 --integrator pt --samples 4 --iterations 100");
+    assert_eq!((code, out.as_str()), (0, ""), "{err}");
+    let json: serde_json::Value =
+        serde_json::from_slice(&std::fs::read(place.path("ref/reference.json")).unwrap()).unwrap();
+    assert_eq!((&json["agrees"], &json["runs"][1]["integrator"]), (&true.into(), &"bpt".into()));
+    // The mean lies between the two, and its variance is less than that of either.
+    let [mean, a, b, variance, va, vb] = ["mean", "pt", "bpt", "variance", "pt_variance", "bpt_variance"]
+        .map(|name| {
+            let image = image::read(&place.path(&format!("ref/{name}.exr"))).unwrap();
+            image.pixels.iter().map(|p| f64::from(p.y)).sum::<f64>()
+        });
+    assert!(
+        a.min(b) <= mean && mean <= a.max(b) && variance < va.min(vb),
+        "{mean} {a} {b} {variance} {va} {vb}"
+    );
+    let line = "compare ref/pt.exr ref/mean.exr --variance ref/pt_variance.exr --reference-variance ref/variance.exr";
+    assert_eq!(place.run(&format!("{line} --max tile_z=5")).0, 0);
+
+    let (code, _, err) = place.run("reference scene.toml -o ref --iterations 4");
+    assert!(code == 2 && err.contains("8 iterations"), "{err}");
+}
+
+#[test]
+fn backends_are_compared_and_agree() {
+    let place = Place::new();
+    let (code, out, err) = place.run("backends scene.toml --rays 2000 --seconds 0.1 --threads 2");
+    assert_eq!(code, 0, "{out}{err}");
+    for word in [
+        "built in",
+        "holds",
+        "camera rays",
+        "diffuse bounces",
+        "connections",
+        "1 thread:",
+        "2 threads:",
+        "0 unexplained",
+        "error 1 % after",
+    ] {
+        assert!(out.contains(word), "{word}: {out}");
+    }
+    assert!(!out.contains("holds ?"), "{out}");
+}

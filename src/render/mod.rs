@@ -166,8 +166,8 @@ fn run(scene: &Scene, settings: &Settings, observer: &dyn Observer) -> Result<Ou
     Ok(Outcome { film, stats, noise, sizes, interrupted })
 }
 
-/// What `auto` stands for: the least machinery that finds all of the scene's light.
-fn chosen(scene: &Scene, settings: &Settings) -> Integrator {
+/// The integrator that is set, or what `auto` stands for: the least machinery that finds all of the scene's light.
+pub fn chosen(scene: &Scene, settings: &Settings) -> Integrator {
     use crate::bsdf::Bsdf;
     if settings.integrator != Integrator::Auto {
         return settings.integrator;

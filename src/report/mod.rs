@@ -2,3 +2,11 @@
 
 pub mod flip;
 pub mod metric;
+pub mod agreement;
+pub mod bootstrap;
+pub mod backends;
+pub mod study;
+pub mod results;
+pub mod curve;
+pub mod chart;
+pub mod page;

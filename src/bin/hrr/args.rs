@@ -2,7 +2,7 @@
 
 use crate::log::Verbosity;
 use crate::render::RenderArgs;
-use crate::{compare, render};
+use crate::{backends, compare, cost, predict, reference, render};
 use clap::error::ErrorKind;
 use clap::{Arg, ArgAction, ArgMatches};
 use std::ffi::OsString;
@@ -15,6 +15,14 @@ pub enum Command {
     Render(RenderArgs),
     /// `hrr compare`.
     Compare(compare::CompareArgs),
+    /// `hrr reference`.
+    Reference(reference::ReferenceArgs),
+    /// `hrr backends`.
+    Backends(backends::BackendsArgs),
+    /// `hrr cost`.
+    Cost(cost::CostArgs),
+    /// `hrr predict`.
+    Predict(predict::PredictArgs),
 }
 
 const MESSAGES: &str = "Messages";
@@ -38,6 +46,10 @@ pub fn parse(args: impl IntoIterator<Item = OsString>) -> Result<Command, clap::
     match matches.subcommand() {
         Some(("render", matches)) => Ok(Command::Render(RenderArgs::new(matches))),
         Some(("compare", matches)) => Ok(Command::Compare(compare::CompareArgs::new(matches))),
+        Some(("reference", matches)) => Ok(Command::Reference(reference::ReferenceArgs::new(matches))),
+        Some(("backends", matches)) => Ok(Command::Backends(backends::BackendsArgs::new(matches))),
+        Some(("cost", matches)) => Ok(Command::Cost(cost::CostArgs::new(matches))),
+        Some(("predict", matches)) => Ok(Command::Predict(predict::PredictArgs::new(matches))),
         // clap knows no other sub-commands, and wants one.
         _ => Err(command().error(ErrorKind::MissingSubcommand, "say what to do, such as 'hrr render'")),
     }
@@ -112,7 +124,14 @@ fn command() -> clap::Command {
         .arg_required_else_help(true)
         .disable_help_subcommand(true)
         .after_help("'hrr render --help' explains a command.")
-        .subcommands([render::command(), compare::command()])
+        .subcommands([
+            render::command(),
+            compare::command(),
+            reference::command(),
+            backends::command(),
+            predict::command(),
+            cost::command(),
+        ])
 }
 
 /// What this build was made with.

@@ -1,9 +1,13 @@
 //! The program `hrr`: renders scenes from the command line. Data goes to stdout, everything else to stderr.
 
 mod args;
+mod backends;
 mod compare;
+mod cost;
 mod log;
+mod predict;
 mod progress;
+mod reference;
 mod render;
 mod scene_args;
 
@@ -34,6 +38,22 @@ fn run() -> u8 {
             (log, render::run(&args, &log))
         }
         Command::Compare(args) => (Log::new(Verbosity::Normal), compare::run(&args)),
+        Command::Reference(args) => {
+            let log = Log::new(args.verbosity);
+            (log, reference::run(&args, &log))
+        }
+        Command::Backends(args) => {
+            let log = Log::new(args.verbosity);
+            (log, backends::run(&args, &log))
+        }
+        Command::Cost(args) => {
+            let log = Log::new(args.verbosity);
+            (log, cost::run(&args, &log))
+        }
+        Command::Predict(args) => {
+            let log = Log::new(args.verbosity);
+            (log, predict::run(&args, &log))
+        }
     };
     result.unwrap_or_else(|error| {
         log.error(&error);

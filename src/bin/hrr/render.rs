@@ -118,7 +118,7 @@ fn output_args() -> [Arg; 5] {
 }
 
 /// Exit code of a render that was stopped, as shells have it for SIGINT.
-const INTERRUPTED: u8 = 130;
+pub const INTERRUPTED: u8 = 130;
 
 /// Does it; returns the exit code.
 pub fn run(args: &RenderArgs, log: &Log) -> Result<u8> {
@@ -215,7 +215,7 @@ fn check_outputs(args: &RenderArgs) -> Result<()> {
 }
 
 /// The first Ctrl-C lets the iteration be finished, the second one ends the program.
-fn stop_on_interrupt(reporter: &Arc<Reporter>) -> Result<()> {
+pub fn stop_on_interrupt(reporter: &Arc<Reporter>) -> Result<()> {
     let reporter = reporter.clone();
     let handler = move || {
         if !reporter.stop() {
