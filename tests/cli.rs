@@ -50,7 +50,7 @@ fn a_wrong_command_line_is_exit_code_2_with_a_suggestion() {
         ("render scene.toml -o a.exr --size 0x10", "WIDTHxHEIGHT"),
         ("render scene.toml -o a.exr --size 10x0", "WIDTHxHEIGHT"),
         ("render scene.toml -o a.exr --max-depth 0", "from 1 to 65535"),
-        ("render scene.toml -o a.exr --samples -1", "from 1 to 65535"),
+        ("render scene.toml -o a.exr --samples -1", "from 0 to 65535"),
         ("render scene.toml -o a.exr --integrator lvc-hrr", "did you mean 'lvc+hrr'?"),
         ("render scene.toml -o a.exr --iterations 3 --time 1", "cannot be used with"),
         ("render scene.toml -o a.exr -D camera.fov=30", "fov_y"),

@@ -97,7 +97,12 @@ pub fn changes(wanted: impl Fn(&Setting) -> bool) -> Vec<Arg> {
         .action(ArgAction::Append)
         .value_parser(parse_define)
         .help("Override a key of the scene file, such as camera.fov_y=30; may be repeated");
-    let settings = TABLE.iter().filter(|s| wanted(s)).map(setting_arg);
+    let iterations = TABLE.iter().any(|s| s.name == "iterations" && wanted(s));
+    let settings = TABLE.iter().filter(|s| wanted(s)).map(|setting| {
+        let arg = setting_arg(setting);
+        let instead = iterations && ["time", "error"].contains(&setting.name);
+        if instead { arg.conflicts_with("iterations") } else { arg }
+    });
     std::iter::once(define).chain(settings).collect()
 }
 
@@ -115,7 +120,7 @@ fn setting_arg(setting: &'static Setting) -> Arg {
         "" => String::new(),
         doc => format!("\n{doc}"),
     };
-    let arg = Arg::new(setting.name)
+    Arg::new(setting.name)
         .long(setting.name.replace('_', "-"))
         .alias(setting.name)
         .value_name(setting.value_name)
@@ -124,8 +129,7 @@ fn setting_arg(setting: &'static Setting) -> Arg {
         .allow_negative_numbers(true)
         .value_parser(move |text: &str| check(setting, text))
         .long_help(format!("{help}{doc}"))
-        .help(help);
-    if ["time", "error"].contains(&setting.name) { arg.conflicts_with("iterations") } else { arg }
+        .help(help)
 }
 
 /// Passes on what the setting takes. A name that is not available yet is left to be refused with its own exit code.
