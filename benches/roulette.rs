@@ -1,5 +1,8 @@
 //! How fast the roulette is, in ratios measured within one run. `cargo bench --bench roulette [-- <part>...]`.
 
+#[cfg(feature = "embree")]
+#[path = "support/against_rays.rs"]
+mod against_rays;
 #[path = "support/variance.rs"]
 mod variance;
 #[path = "support/workload.rs"]
@@ -121,7 +124,9 @@ fn overhead() {
 
 fn main() {
     let wanted: Vec<String> = std::env::args().skip(1).filter(|a| !a.starts_with("--")).collect();
-    let parts: [(&str, fn()); 6] = [
+    let parts: [(&str, fn()); _] = [
+        #[cfg(feature = "embree")]
+        ("rays", against_rays::rays),
         ("overhead", overhead),
         ("visits", visits),
         ("all", against_testing_all),

@@ -3,7 +3,7 @@
 use crate::geometry::SurfacePoint;
 use crate::math::Spectrum;
 use crate::mis::Side;
-use crate::subpath::{Vertex, Walk, World};
+use crate::subpath::{Origin, Vertex, Walk, World};
 use glam::Vec3;
 use std::ops::Range;
 
@@ -17,17 +17,23 @@ struct Record {
     throughput: Vec3,
     depth: u32,
     after_delta: bool,
-    after_narrow: [bool; 2],
+    origins: [Origin; 2],
     side: Side,
 }
 
 /// Light vertices in the order of their subpaths. Buffers are kept between iterations.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub struct LightCache {
     positions: Vec<Vec3>,
     records: Vec<Record>,
     /// First vertex of each subpath, and the end.
     starts: Vec<u32>,
+}
+
+impl Default for LightCache {
+    fn default() -> Self {
+        Self { positions: Vec::new(), records: Vec::new(), starts: vec![0] }
+    }
 }
 
 impl LightCache {
@@ -51,7 +57,7 @@ impl LightCache {
             throughput: light.throughput.as_vec3(),
             depth: light.depth,
             after_delta: light.after_delta,
-            after_narrow: light.after_narrow,
+            origins: light.origins,
             side: light.side,
         });
     }
@@ -115,10 +121,11 @@ impl LightCache {
             vertex: Vertex::new(world, point, r.wo.as_dvec3().normalize()),
             throughput: Spectrum::from(r.throughput),
             side: r.side,
+            b_as_lamp: r.side.b,
             distance: f64::from(r.distance),
             depth: r.depth,
             after_delta: r.after_delta,
-            after_narrow: r.after_narrow,
+            origins: r.origins,
         }
     }
 

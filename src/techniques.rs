@@ -7,7 +7,7 @@ use crate::mis::Heuristic;
 use crate::roulette::{self, Lobe};
 use crate::sampler::Sampler;
 use crate::subpath::walk::{Rules, Walk};
-use crate::subpath::{Storing, Vertex, World, from_light};
+use crate::subpath::{Role, Storing, Total, Vertex, World, from_light};
 use glam::DVec3;
 use std::ops::Deref;
 use std::sync::Arc;
@@ -22,15 +22,15 @@ pub struct Techniques {
     pub eye_hits: f64,
     /// m_1: next-event estimation, relative to emission, which draws its points from the same density.
     pub next_event: f64,
-    /// m_{k-1}, over the probability of storing: light subpaths seen by the camera, light subpaths over eye samples.
+    /// m_{k-1}, of light vertices that are seen at all: light subpaths seen by the camera, light subpaths over eye samples.
     pub light_image: f64,
-    /// m_s, 2 <= s <= k-2, where the roulette is off.
+    /// m_s, 2 <= s <= k-2, where the roulette is off: of light vertices of any kind.
     pub base: f64,
     /// m_s where the roulette is on.
     pub roulette: Option<Roulette>,
     /// How light vertices are merged with eye vertices.
     pub merging: Option<Merging>,
-    /// Which light vertices are stored: a probability that is part of every m that needs one.
+    /// Which light vertices the roulette, merging and the camera use: a probability that is part of their m.
     pub storing: Storing,
     /// Where light subpaths are sent; `None`: by the cosine.
     pub guide: Option<Arc<EmissionGuide>>,
@@ -142,18 +142,26 @@ impl Techniques {
         lobes
     }
 
-    /// m_s of an edge between two surfaces, neither of them delta, over the probability of storing the light-side one.
-    /// `lobes`: those of the eye-side vertex; `offset`: from there to the light-side vertex.
-    pub fn connection(&self, lobes: &Lobes, offset: DVec3) -> f64 {
+    /// m_s of an edge between two surfaces, neither of them delta: where the roulette is off, and, over the probability
+    /// of storing the light-side one, where it plays. `lobes`: those of the eye-side vertex; `offset`: from there to
+    /// the light-side vertex.
+    pub fn connection(&self, lobes: &Lobes, offset: DVec3) -> Total {
         match &self.roulette {
-            Some(roulette) if !lobes.is_empty() => roulette.density(lobes, offset),
-            _ => self.base,
+            Some(roulette) if !lobes.is_empty() => {
+                Total { stored: roulette.density(lobes, offset), ..Total::default() }
+            }
+            _ => Total::known(self.base),
         }
     }
 
     /// The probability with which a light vertex was stored.
     pub fn stored(&self, light: &Walk) -> f64 {
-        self.storing.probability(light.after_narrow[0])
+        self.storing.probability(Role::Stored, light.origins[0])
+    }
+
+    /// 1 or 0: whether the camera is connected to a light vertex.
+    pub fn seen(&self, light: &Walk) -> f64 {
+        self.storing.probability(Role::Seen, light.origins[0])
     }
 
     /// m of the edge that leads to the light vertex's predecessor, were the light vertex an eye vertex seen from
@@ -165,12 +173,11 @@ impl Techniques {
         if light.depth == 1 {
             return self.next_event;
         }
-        let stored = self.storing.probability(light.after_narrow[1]);
         if self.roulette.is_none() {
-            stored * self.base
-        } else {
-            stored * self.connection(&self.lobes(&light.vertex, w_eye), light.to_previous())
+            return self.base;
         }
+        let m = self.connection(&self.lobes(&light.vertex, w_eye), light.to_previous());
+        m.known + m.stored * self.storing.probability(Role::Stored, light.origins[1])
     }
 
     /// Density of a light subpath's first direction, 1/sr.
@@ -214,10 +221,10 @@ impl Techniques {
     pub fn next_light(&self, world: &World<'_>, light: &Walk, sampler: &Sampler) -> Option<Walk> {
         light.next(world, &self.rules(Transport::Importance), sampler, |s| {
             if s.delta {
-                return [self.heuristic.total(&light.side, 0.0, s.pdf_rev, 0.0), 0.0];
+                return Total::known(self.heuristic.total(&light.side, 0.0, s.pdf_rev, 0.0));
             }
             let merging = self.stored(light) * self.eta();
-            [self.heuristic.total(&light.side, self.before(light, s.wi), s.pdf_rev, merging), 0.0]
+            Total::known(self.heuristic.total(&light.side, self.before(light, s.wi), s.pdf_rev, merging))
         })
     }
 }

@@ -56,7 +56,8 @@ fn all_integrators_agree_on_cornell_to_half_a_percent() {
 #[test]
 fn all_integrators_agree_on_every_material() {
     let scene = scenes::box_of_everything();
-    let pt = run(&scene, Integrator::Pt, 1, 64, 16);
+    // Path tracing finds the caustics through rare, bright paths: it takes many until their mean is normal.
+    let pt = run(&scene, Integrator::Pt, 1, 512, 16);
     // Light tracing is left out: it sees no mirrors and no glass.
     let others =
         [Integrator::Bpt, Integrator::Lvc, Integrator::LvcHrr, Integrator::Pcbpt, Integrator::PcbptHrr];

@@ -1,6 +1,7 @@
 //! What the fuzzer runs (docs/fuzzing.md), on bytes from a random number generator.
 
 use crate::support::Random;
+use crate::support::calls_of_bytes;
 use crate::support::query_of_bytes::check;
 
 /// A string of up to `most` bytes whose first is `what`.
@@ -33,5 +34,19 @@ fn no_bytes_and_few() {
         check(&[what, 3, 10]);
         check(&[what; 100]);
         check(&[what; 1000]);
+    }
+}
+
+#[test]
+fn any_bytes_as_calls_of_the_c_interface() {
+    let mut rng = Random::new(0xca11);
+    // An interpreter gets through fewer (docs/fuzzing.md).
+    let (strings, step) = if cfg!(miri) { (30, 51) } else { (1500, 1) };
+    let found: usize = (0..strings).map(|i| calls_of_bytes::check(&bytes(&mut rng, i as u8, 3000.0))).sum();
+    // Random calls must really find something.
+    assert!(found > strings / 2, "{found}");
+    calls_of_bytes::check(&[]);
+    for what in (0..=255).step_by(step) {
+        calls_of_bytes::check(&[what; 500]);
     }
 }

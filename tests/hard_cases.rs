@@ -5,6 +5,7 @@
 //! `ray_offset`), the furnace at every roughness (`bsdf/energy`), any bytes (`fuzz`).
 
 mod numbers;
+mod precision;
 
 use crate::roulette::{hits, lit_lobe, random_frame, surface_points, u};
 use glam::{DVec3, Vec3};
@@ -297,6 +298,7 @@ fn flush_to_zero_changes_nothing() {
     flushing_to_zero(|| {
         assert_eq!(sets(), plain);
         denormal_and_huge_coordinates();
+        precision::eye_and_light_vertices_that_are_denormal();
     });
 }
 

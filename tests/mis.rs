@@ -12,7 +12,7 @@ use hrr::mis::Heuristic;
 use hrr::sampler::{Purpose, Sampler, Stream};
 use hrr::settings::{Backend, Settings};
 use hrr::subpath::walk::Start;
-use hrr::subpath::{Storing, Vertex, Walk, World};
+use hrr::subpath::{Origin, Role, Storing, Total, Vertex, Walk, World};
 use hrr::techniques::{Merging, Roulette, Techniques};
 use hrr::visibility::offset;
 use std::sync::Arc;
@@ -26,7 +26,7 @@ const TECHNIQUES: Techniques = Techniques {
     base: 1.7,
     roulette: Some(Roulette { light_subpaths: 1400.0, constant: 0.02, max_alpha: 0.3 }),
     merging: Some(Merging { light_subpaths: 1400.0, radius: 0.01 }),
-    storing: Storing { share: 0.3, max_alpha: 0.22 },
+    storing: Storing { share: 0.3, max_alpha: 0.22, lamps: false },
     guide: None,
 };
 
@@ -87,11 +87,18 @@ impl Path {
             }
             self.pdf_w(world, i + 1, i + 2, i) * self.g(world, i + 1, i)
         };
-        // The probability of storing vertex i: what threw light on it decides.
-        let stored = |i: usize| {
-            let triangle =
-                if i == 1 { self.emitter.point.triangle } else { self.surfaces[i - 2].point.triangle };
-            if t.storing.is_narrow(&world.bsdf_of(triangle)) { 1.0 } else { t.storing.share }
+        // The probability of vertex i's role: what threw light on it decides.
+        let has = |role: Role, i: usize| {
+            let origin = if i == 1 {
+                Origin::Lamp
+            } else {
+                t.storing.origin(&world.bsdf_of(self.surfaces[i - 2].point.triangle))
+            };
+            match (role, origin) {
+                (_, Origin::Lamp) if !t.storing.lamps => 0.0,
+                (Role::Stored, Origin::Lamp | Origin::Broad) => t.storing.share,
+                _ => 1.0,
+            }
         };
         let m = |s: usize| {
             if s == 0 {
@@ -104,16 +111,18 @@ impl Path {
                 return t.next_event;
             }
             if s == k - 1 {
-                return t.light_image * stored(s - 1);
+                return t.light_image * has(Role::Seen, s - 1);
             }
             let lobes = t.lobes(&self.surfaces[s - 1], self.to(world, s, s + 1));
             let offset = self.position(world, s - 1) - self.position(world, s);
-            t.connection(&lobes, offset) * stored(s - 1)
+            let m = t.connection(&lobes, offset);
+            m.known + m.stored * has(Role::Stored, s - 1)
         };
         let b = |s: usize| (0..s).map(fw).product::<f64>() * (s..k - 1).map(rv).product::<f64>();
         let eta = t.merging.map_or(0.0, |m| m.light_subpaths * std::f64::consts::PI * m.radius * m.radius);
-        let merging =
-            |i: usize| if i == 0 || i > k - 2 || delta(i) { 0.0 } else { stored(i) * eta * b(i) * fw(i) };
+        let merging = |i: usize| {
+            if i == 0 || i > k - 2 || delta(i) { 0.0 } else { has(Role::Stored, i) * eta * b(i) * fw(i) }
+        };
         [(0..k).map(|s| m(s) * b(s)).collect(), (0..k).map(merging).collect()]
     }
 
@@ -159,12 +168,12 @@ fn led_to(world: &World<'_>, t: &Techniques, light: &Walk, end: &Vertex) -> Opti
         direction,
         pdf_w,
         cos: y.cos_ng(direction),
-        total: [t.light_total(light, direction), 0.0],
+        total: Total::known(t.light_total(light, direction)),
     };
     let throughput = light.throughput * y.factor(direction, y.wo) * (start.cos / pdf_w);
     let walk = Walk {
         depth: light.depth + 1,
-        after_narrow: [t.storing.is_narrow(&y.bsdf), light.after_narrow[0]],
+        origins: [t.storing.origin(&y.bsdf), light.origins[0]],
         ..Walk::follow(world, &t.rules(Transport::Importance), &start, throughput)?
     };
     let there = (walk.vertex.point.position - end.point.position).length() < 1e-9;
@@ -191,7 +200,10 @@ fn recursion_equals_the_definition() {
     assert!(guide.is_some());
     for heuristic in Heuristic::ALL {
         for guide in [None, guide.clone()] {
-            check(&world, &Techniques { heuristic, guide, ..TECHNIQUES });
+            for lamps in [false, true] {
+                let storing = Storing { lamps, ..TECHNIQUES.storing };
+                check(&world, &Techniques { heuristic, guide: guide.clone(), storing, ..TECHNIQUES });
+            }
         }
     }
 }
@@ -263,7 +275,8 @@ fn check(world: &World<'_>, t: &Techniques) {
             let path = path(start, &lights, &eyes);
             let s = lights.len() + 1;
             let offset = light.vertex.point.position - eye.walk.vertex.point.position;
-            let m = t.connection(&eye.lobes, offset) * t.stored(light);
+            let m = t.connection(&eye.lobes, offset);
+            let m = m.known + m.stored * t.stored(light);
             if let Some((value, _)) = eye.connect(t, light, m, 1.0) {
                 let (y, z) = (&light.vertex, &eye.walk.vertex);
                 let w = offset.normalize();
@@ -288,7 +301,7 @@ fn check(world: &World<'_>, t: &Techniques) {
             let value = eye.merge(t, merging, &light);
             let tries = merging.eta() * t.stored(&light);
             let plain = eye.walk.throughput * z.factor(z.wo, y.wo) * light.throughput / tries;
-            if plain.x > 0.0 {
+            if plain.x > 0.0 && tries > 0.0 {
                 close("merging", value.x / plain.x, path.weight(world, t, 1, lights.len() + 1));
                 count(4, &path);
             }
@@ -303,7 +316,7 @@ fn check(world: &World<'_>, t: &Techniques) {
             let w = path.to(world, k - 2, k - 1);
             let plain =
                 light.throughput * y.factor(w, y.wo) * (path.g(world, k - 1, k - 2) * world.camera.pdf_w(-w));
-            let tries = t.light_image * t.stored(light);
+            let tries = t.light_image * t.seen(light);
             close("s = k-1", value.x / plain.x * tries, path.weight(world, t, 0, k - 1));
             count(3, &path);
         }

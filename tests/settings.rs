@@ -1,6 +1,6 @@
 //! The settings table, the struct behind it and its TOML are one thing.
 
-use hrr::settings::{Backend, Guiding, Heuristic, Integrator, Kind, Setting, Settings, TABLE};
+use hrr::settings::{Backend, Heuristic, Integrator, Kind, Setting, Settings, Switch, TABLE};
 
 /// A value of each setting that is not its default. A new setting has no entry here yet: the tests say so.
 fn other_value(name: &str) -> &'static str {
@@ -22,6 +22,7 @@ fn other_value(name: &str) -> &'static str {
         "hrr_alpha" => "0.125",
         "iterations" => "9",
         "memory" => "3.5",
+        "adaptive" => "off",
         "time" => "30.5",
         "error" => "0.25",
         "first_iteration" => "64",
@@ -61,6 +62,7 @@ fn every_field_has_its_row() {
         hrr_alpha,
         storing,
         guiding,
+        adaptive,
         mis,
         reused_subpaths,
         record_spacing,
@@ -75,7 +77,7 @@ fn every_field_has_its_row() {
     assert_eq!((threads, memory, expected, hrr_alpha, mis), (2, 3.5, 0.25, 0.125, Heuristic::Power));
     assert_eq!((merge_radius, merge_pixels, merge_shrink), (0.5, 5.0, 1.0));
     assert_eq!((reused_subpaths, record_spacing), (50, 4));
-    assert_eq!((storing, guiding, TABLE.len()), (0.5, Guiding::Off, 23));
+    assert_eq!((storing, guiding, adaptive, TABLE.len()), (0.5, Switch::Off, Switch::Off, 24));
 }
 
 #[test]

@@ -82,11 +82,8 @@ width  = 200
 height = 150
 
 [render]
-max_depth      = 24
-iterations     = 8
-# Noise falls with the product of the two, time grows with their sum: few large iterations.
-light_subpaths = 2000000
-samples        = 24
+max_depth = 24
+time      = 60
 ";
 
 /// A brass strip under a small lamp; its caustic is seen in a mirror of roughness 1e-4.

@@ -69,10 +69,13 @@ illum 7
 hrr_alpha_x 0.08
 hrr_alpha_y 0.08
 
+# Extremely glossy: GGX roughness 1e-4, not squared.
 newmtl mirror
 Kd 0 0 0
 Ks 0.95 0.95 0.95
 illum 3
+hrr_alpha_x 1e-4
+hrr_alpha_y 1e-4
 ";
 
 const TOML: &str = "\
@@ -86,11 +89,8 @@ width  = 200
 height = 150
 
 [render]
-max_depth      = 24
-iterations     = 8
-# Noise falls with the product of the two, time grows with their sum: few large iterations.
-light_subpaths = 2000000
-samples        = 24
+max_depth = 24
+time      = 60
 
 [material.glass]
 type = \"dielectric\"

@@ -1,11 +1,21 @@
 //! Caches: light vertices in a tree. Made by a build, and immutable from then on.
 
+use super::capture::Capture;
+use super::contents;
 use super::context::{HrrContext, Spare};
+use super::log::{HRR_LOG_INFO, HRR_LOG_WARNING};
+use super::memory::Held;
 use super::pointer::{self, Out, Strided};
+use super::progress::{HrrProgressFn, Progress};
 use super::segment::{Gathered, HRR_DOUBLE3, HRR_FLOAT3, HrrSegment, Rules};
-use super::status::{Failure, HRR_ERROR_OUT_OF_MEMORY, HrrStatus, Outcome, guard};
-use crate::vertex_bvh::VertexBvh;
+use super::status::{
+    Failure, HRR_ERROR_INTERNAL, HRR_ERROR_IO, HRR_ERROR_OUT_OF_MEMORY, HrrStatus, Outcome, guard,
+};
+use crate::file;
+use crate::vertex_bvh::{MAX_VERTICES, NodeId, VertexBvh};
 use glam::DVec3;
+use std::ffi::{c_char, c_void};
+use std::path::Path;
 use std::sync::{Arc, Weak};
 use std::time::Instant;
 use xxhash_rust::xxh3::Xxh3;
@@ -40,12 +50,20 @@ pub struct HrrBuildDesc {
     pub reserved: u32,
     /// Fail rather than need more memory than this, in bytes, by hrr_cache_estimate_bytes; 0 = no limit.
     pub max_bytes: u64,
+    /// Told how far the build is; NULL = nobody is. What it returns ends the build with HRR_ERROR_CANCELLED, before the
+    /// tree is begun or after; gathering looks often, the tree itself not.
+    pub progress: HrrProgressFn,
+    /// Passed to progress.
+    pub progress_user: *mut c_void,
 }
 
 /// Light vertices in a tree. Immutable: any number of threads may query it at once. Opaque; see hrr_cache_build.
 #[derive(Debug)]
 pub struct HrrCache {
     pub(super) storage: Storage,
+    pub(super) capture: Arc<Capture>,
+    /// Tells caches of a capture apart.
+    pub(super) serial: u64,
     dropped: u64,
     build_seconds: f64,
     spare: Weak<Spare>,
@@ -55,13 +73,36 @@ pub struct HrrCache {
 #[derive(Debug, Default)]
 pub(super) struct Storage {
     pub bvh: VertexBvh,
+    /// Empty where every id is the vertex' index: a look-up less for each hit.
     pub ids: Vec<u64>,
     pub origin: DVec3,
+    pub held: Option<Held>,
+}
+
+impl Storage {
+    fn bytes(&self) -> u64 {
+        (self.bvh.bytes() + self.bvh.build_bytes() + size_of_val(&self.ids[..])) as u64
+    }
+
+    /// The id of the vertex with an index.
+    #[inline(always)]
+    pub fn id(&self, index: u32) -> u64 {
+        if self.ids.is_empty() { index.into() } else { self.ids[index as usize] }
+    }
+}
+
+/// Where a cache's light vertices come from.
+pub(super) struct Source<F> {
+    /// At most so many.
+    pub count: u64,
+    pub masked: bool,
+    /// Puts them into the empty buffers that it is given.
+    pub fill: F,
+    pub progress: Progress,
 }
 
 impl HrrCache {
     unsafe fn build(context: &HrrContext, desc: &HrrBuildDesc) -> Outcome<Self> {
-        let start = Instant::now();
         let choice = |value: u32, name: &str| match value {
             0 => Ok(false),
             1 => Ok(true),
@@ -79,38 +120,104 @@ impl HrrCache {
         let count = desc.segment_count as usize;
         // SAFETY: the caller passes on its own caller's word.
         let segments = unsafe { Strided::new(desc.segments, 0, count, "desc->segments") }?;
-        if desc.max_bytes > 0 {
-            // SAFETY: below the count.
-            let segment = |i| unsafe { segments.get(i) };
-            let total = (0..count).fold(0u64, |sum, i| sum.saturating_add(segment(i).count));
-            let needed = estimate(total, (0..count).any(|i| !segment(i).mask.is_null()));
-            if needed > desc.max_bytes {
-                let message =
-                    format!("{total} light vertices take {needed} bytes, {} allowed", desc.max_bytes);
-                return Err(Failure::new(HRR_ERROR_OUT_OF_MEMORY, message));
-            }
+        // SAFETY: below the count.
+        let segment = |i| unsafe { segments.get(i) };
+        let total = (0..count).fold(0u64, |sum, i| sum.saturating_add(segment(i).count));
+        let masked = (0..count).any(|i| !segment(i).mask.is_null());
+        let needed = estimate(total, masked);
+        if desc.max_bytes > 0 && needed > desc.max_bytes {
+            let message = format!("{total} light vertices take {needed} bytes, {} allowed", desc.max_bytes);
+            return Err(Failure::new(HRR_ERROR_OUT_OF_MEMORY, message));
         }
+        // Nobody is asked for memory because of a count that cannot be meant.
+        if total > MAX_VERTICES as u64 && desc.invalid == HRR_INVALID_ERROR {
+            let message = format!("the count of all segments is {total}: at most 2^31 fit a cache");
+            return Err(Failure::argument(message));
+        }
+        let progress = Progress::new(desc.progress, desc.progress_user);
+        // SAFETY: `count` segments, as above.
+        let fill = |gathered: &mut Gathered| unsafe { gathered.fill(segments, count, rules, progress) };
+        let cache = Self::new(context, Source { count: total, masked, fill, progress })?;
+        if cache.dropped > 0 {
+            context.log.say(HRR_LOG_WARNING, || {
+                format!("{} of {total} light vertices are not finite and were left out", cache.dropped)
+            });
+        }
+        Ok(cache)
+    }
+
+    /// Builds a cache with the context's threads and memory.
+    pub(super) fn new<F: FnOnce(&mut Gathered) -> Outcome + Send>(
+        context: &HrrContext,
+        source: Source<F>,
+    ) -> Outcome<Self> {
+        let start = Instant::now();
+        source.progress.at(0.0)?;
         let (mut storage, mut gathered) = context.spare.take();
+        let old = [storage.held.take(), gathered.held.take()];
+        let held = Held::at_least(&context.account, old, estimate(source.count, source.masked))?;
+        gathered.clear();
+        let mut fill = Some(source.fill);
         let mut build = || -> Outcome {
-            // SAFETY: `count` segments, as above.
-            unsafe { gathered.fill(segments, count, rules) }?;
+            if let Some(fill) = fill.take() {
+                fill(&mut gathered)?;
+            }
+            source.progress.at(GATHERED)?;
             let Gathered { positions, masks, ids, .. } = &mut gathered;
             let masks = (!masks.is_empty()).then_some(&masks[..]);
             storage.bvh.build_masked(positions, masks)?;
+            if (0..).zip(&ids[..]).all(|(index, &id): (u64, _)| index == id) {
+                ids.clear();
+            }
             std::mem::swap(&mut storage.ids, ids);
-            Ok(())
+            source.progress.at(1.0)
         };
         context.pool.install(&mut build)?;
         storage.origin = gathered.origin;
         let dropped = gathered.dropped;
+        let (own, spare) = held.split(storage.bytes(), gathered.bytes());
+        (storage.held, gathered.held) = (Some(own), Some(spare));
         context.spare.give_gathered(gathered);
-        let (build_seconds, spare) = (start.elapsed().as_secs_f64(), Arc::downgrade(&context.spare));
-        Ok(Self { storage, dropped, build_seconds, spare })
+        let build_seconds = start.elapsed().as_secs_f64();
+        context.log.say(HRR_LOG_INFO, || {
+            let (n, bytes) = (storage.bvh.len(), storage.bytes());
+            format!("cache of {n} light vertices, {bytes} bytes, built in {build_seconds:.4} s")
+        });
+        let (capture, serial) = (context.capture.clone(), context.capture.next_serial());
+        let spare = Arc::downgrade(&context.spare);
+        Ok(Self { storage, capture, serial, dropped, build_seconds, spare })
     }
 
     /// What becomes of a position in the cache's coordinates.
     pub(super) fn relative(&self, position: DVec3) -> DVec3 {
         position - self.storage.origin
+    }
+
+    pub(super) fn dropped(&self) -> u64 {
+        self.dropped
+    }
+
+    /// Whether there are masks.
+    pub(super) fn masked(&self) -> bool {
+        self.storage.bvh.root().is_some_and(|root| self.storage.bvh.masks(root).is_some())
+    }
+
+    /// What queries can see, in one number.
+    pub(super) fn fingerprint(&self) -> u64 {
+        let Storage { bvh, origin, .. } = &self.storage;
+        let mut hash = Xxh3::new();
+        origin.to_array().iter().for_each(|x| hash.update(&x.to_bits().to_le_bytes()));
+        for (i, block) in bvh.blocks().iter().enumerate() {
+            let node = NodeId { level: 0, index: i as u32 };
+            for lane in 0..bvh.children(node) {
+                for axis in block.position {
+                    hash.update(&axis[lane].to_bits().to_le_bytes());
+                }
+                hash.update(&self.storage.id(block.index[lane]).to_le_bytes());
+                hash.update(&bvh.masks(node).map_or(u32::MAX, |masks| masks[lane]).to_le_bytes());
+            }
+        }
+        hash.digest()
     }
 }
 
@@ -121,6 +228,9 @@ impl Drop for HrrCache {
         }
     }
 }
+
+/// How much of a build is done when all vertices are gathered, about.
+const GATHERED: f64 = 0.3;
 
 /// Bytes at the height of a build: gathered positions and ids (old and new), the order, blocks, boxes; masks.
 fn estimate(count: u64, masked: bool) -> u64 {
@@ -139,8 +249,8 @@ pub extern "C" fn hrr_cache_estimate_bytes(vertex_count: u64, masked: u32) -> u6
 /// context's pool; the tree is the same for any number of threads. Memory of a cache released before is used again.
 /// Afterwards nothing of the host's is referred to. Any thread; other caches may be built and queried meanwhile.
 ///
-/// Errors: HRR_ERROR_INVALID_ARGUMENT, HRR_ERROR_NON_FINITE, HRR_ERROR_OUT_OF_MEMORY, HRR_ERROR_ABI; *out_cache is
-/// then as it was.
+/// Errors: HRR_ERROR_INVALID_ARGUMENT, HRR_ERROR_NON_FINITE, HRR_ERROR_OUT_OF_MEMORY, HRR_ERROR_ABI,
+/// HRR_ERROR_CANCELLED; *out_cache is then as it was.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn hrr_cache_build(
     context: *const HrrContext,
@@ -213,17 +323,15 @@ pub unsafe extern "C" fn hrr_cache_info(cache: *const HrrCache, info: *mut HrrCa
         // SAFETY: this module's contract.
         let cache = unsafe { pointer::object(cache, "cache") }?;
         // SAFETY: this module's contract.
-        let out = unsafe { Out::new(info, "info") }?;
-        // SAFETY: this module's contract; not NULL.
-        let struct_size = unsafe { pointer::struct_size(info, "info") }? as u32;
-        let Storage { bvh, ids, origin } = &cache.storage;
+        let (out, struct_size) = unsafe { pointer::sized_out(info, "info") }?;
+        let Storage { bvh, origin, .. } = &cache.storage;
         let corner = |c: Option<glam::Vec3>| c.map_or(DVec3::ZERO, |c| c.as_dvec3() + origin).to_array();
         out.write(HrrCacheInfo {
             struct_size,
             levels: bvh.root().map_or(0, |root| root.level + 1),
             vertex_count: bvh.len() as u64,
             dropped_count: cache.dropped,
-            bytes: (bvh.bytes() + bvh.build_bytes() + size_of_val(&ids[..])) as u64,
+            bytes: cache.storage.bytes(),
             origin: origin.to_array(),
             bounds_min: corner(bvh.bounds().map(|b| b.min)),
             bounds_max: corner(bvh.bounds().map(|b| b.max)),
@@ -242,20 +350,63 @@ pub unsafe extern "C" fn hrr_cache_hash(cache: *const HrrCache, out_hash: *mut u
     guard(|| {
         // SAFETY: this module's contract.
         let (cache, out) = unsafe { (pointer::object(cache, "cache")?, Out::new(out_hash, "out_hash")?) };
-        let Storage { bvh, ids, origin } = &cache.storage;
-        let mut hash = Xxh3::new();
-        origin.to_array().iter().for_each(|x| hash.update(&x.to_bits().to_le_bytes()));
-        for (i, block) in bvh.blocks().iter().enumerate() {
-            let node = crate::vertex_bvh::NodeId { level: 0, index: i as u32 };
-            for lane in 0..bvh.children(node) {
-                for axis in block.position {
-                    hash.update(&axis[lane].to_bits().to_le_bytes());
-                }
-                hash.update(&ids[block.index[lane] as usize].to_le_bytes());
-                hash.update(&bvh.masks(node).map_or(u32::MAX, |masks| masks[lane]).to_le_bytes());
-            }
+        out.write(cache.fingerprint());
+        Ok(())
+    })
+}
+
+/// Checks a cache: every vertex once, every box around what is below it, every mask the union of those below. For memory
+/// that something else has written to. Reads the whole cache, in some 20 ns for each vertex. Any thread.
+///
+/// Errors: HRR_ERROR_INVALID_ARGUMENT, HRR_ERROR_INTERNAL (the message says what is wrong).
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn hrr_cache_validate(cache: *const HrrCache) -> HrrStatus {
+    guard(|| {
+        // SAFETY: this module's contract.
+        let cache = unsafe { pointer::object(cache, "cache") }?;
+        cache.storage.bvh.validate()?;
+        let (ids, vertices) = (cache.storage.ids.len(), cache.storage.bvh.len());
+        if ids != 0 && ids != vertices {
+            return Err(Failure::new(HRR_ERROR_INTERNAL, format!("{ids} ids for {vertices} light vertices")));
         }
-        out.write(hash.digest());
+        Ok(())
+    })
+}
+
+/// Writes a cache's light vertices to a file (path in UTF-8), whole or not at all; what was there is replaced. About 20
+/// bytes for each vertex, the same on every machine. Any thread.
+///
+/// Errors: HRR_ERROR_INVALID_ARGUMENT, HRR_ERROR_IO.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn hrr_cache_save(cache: *const HrrCache, path: *const c_char) -> HrrStatus {
+    guard(|| {
+        // SAFETY: this module's contract.
+        let (cache, path) = unsafe { (pointer::object(cache, "cache")?, pointer::text(path, "path")?) };
+        Ok(file::replace(Path::new(path), &contents::write(cache))?)
+    })
+}
+
+/// Makes the cache that hrr_cache_save wrote: the same hits for the same queries. The file is not trusted: one that is
+/// damaged is refused. The tree is built anew. Any thread.
+///
+/// Errors: HRR_ERROR_INVALID_ARGUMENT, HRR_ERROR_IO, HRR_ERROR_OUT_OF_MEMORY.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn hrr_cache_load(
+    context: *const HrrContext,
+    path: *const c_char,
+    out_cache: *mut *mut HrrCache,
+) -> HrrStatus {
+    guard(|| {
+        // SAFETY: this module's contract.
+        let (context, path, out) = unsafe {
+            let out = Out::new(out_cache, "out_cache")?;
+            (pointer::object(context, "context")?, pointer::text(path, "path")?, out)
+        };
+        let io = |what: &dyn std::fmt::Display| Failure::new(HRR_ERROR_IO, format!("{path}: {what}"));
+        let bytes = std::fs::read(path).map_err(|e| io(&e))?;
+        let cache = contents::read(context, &bytes)
+            .map_err(|f| if f.status == HRR_ERROR_OUT_OF_MEMORY { f } else { io(&f.message) })?;
+        out.write(pointer::handle(cache));
         Ok(())
     })
 }

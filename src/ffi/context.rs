@@ -1,6 +1,9 @@
 //! Contexts: threads, and memory that builds hand to each other.
 
 use super::cache::Storage;
+use super::capture::Capture;
+use super::log::{HRR_LOG_INFO, HrrLogFn, Log};
+use super::memory::{Account, HrrMemoryFn};
 use super::pointer::{self, Out};
 use super::segment::Gathered;
 use super::status::{Failure, HRR_ERROR_INTERNAL, HrrStatus, Outcome, guard};
@@ -29,6 +32,18 @@ pub struct HrrContextDesc {
     pub parallel_for: HrrParallelForFn,
     /// Passed to parallel_for.
     pub parallel_user: *mut c_void,
+    /// Where messages go; NULL = nowhere.
+    pub log: HrrLogFn,
+    /// Passed to log.
+    pub log_user: *mut c_void,
+    /// HRR_LOG_*: the highest level that is said; 0 = nothing.
+    pub log_level: u32,
+    /// 0.
+    pub reserved: u32,
+    /// Asked for memory; NULL = nobody is.
+    pub memory: HrrMemoryFn,
+    /// Passed to memory.
+    pub memory_user: *mut c_void,
 }
 
 /// Threads and spare memory. May be used from any thread, by several at once. Opaque; see hrr_context_new.
@@ -37,6 +52,9 @@ pub struct HrrContext {
     pub(super) pool: Pool,
     pub(super) host: Option<HostThreads>,
     pub(super) spare: Arc<Spare>,
+    pub(super) log: Log,
+    pub(super) account: Arc<Account>,
+    pub(super) capture: Arc<Capture>,
 }
 
 /// Buffers of released caches and of builds, for the next build.
@@ -46,7 +64,7 @@ pub(super) struct Spare {
     gathered: Mutex<Option<Gathered>>,
 }
 
-fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+pub(super) fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     // Nothing is ever half done under these locks.
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
@@ -123,9 +141,17 @@ impl HrrContext {
         if threads > MAX_THREADS {
             return Err(Failure::argument(format!("desc->threads is {threads}: at most {MAX_THREADS}")));
         }
+        let level = desc.map_or(0, |d| d.log_level);
+        if level > HRR_LOG_INFO || desc.is_some_and(|d| d.reserved != 0) {
+            let message = format!("desc->log_level is {level}: no HRR_LOG_*, or desc->reserved is not 0");
+            return Err(Failure::argument(message));
+        }
         let pool = Pool::new(threads as usize)?;
         let host = desc.and_then(|d| HostThreads::new(d.parallel_for, d.parallel_user));
-        Ok(Self { pool, host, spare: Arc::default() })
+        let log = desc.map_or(Log::default(), |d| Log::new(d.log, d.log_user, level));
+        let account = Arc::new(desc.map_or(Account::default(), |d| Account::new(d.memory, d.memory_user)));
+        log.say(HRR_LOG_INFO, || format!("hrr {}, {} threads", env!("CARGO_PKG_VERSION"), pool.threads()));
+        Ok(Self { pool, host, spare: Arc::default(), log, account, capture: Arc::default() })
     }
 }
 
@@ -158,8 +184,8 @@ pub unsafe extern "C" fn hrr_context_retain(context: *mut HrrContext) {
     });
 }
 
-/// Gives up a reference; the last one ends the context's threads and waits for that. NULL is allowed. Caches live on without their
-/// context. Any thread.
+/// Gives up a reference; the last one ends the context's threads and waits for that. NULL is allowed. Caches live on
+/// without their context. Any thread, but not within a callback.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn hrr_context_release(context: *mut HrrContext) {
     guard(|| {
@@ -167,6 +193,40 @@ pub unsafe extern "C" fn hrr_context_release(context: *mut HrrContext) {
         unsafe { pointer::release(context) };
         Ok(())
     });
+}
+
+/// What a context holds. Set struct_size before the call.
+#[repr(C)]
+#[derive(Debug, Clone, Copy)]
+pub struct HrrContextInfo {
+    /// sizeof(HrrContextInfo).
+    pub struct_size: u32,
+    /// Threads of the pool.
+    pub threads: u32,
+    /// Bytes that the context's caches hold, with the memory kept for the next build. Geometry and scenes are not
+    /// counted.
+    pub bytes: u64,
+    /// The most that `bytes` ever was, by upper bounds while builds went on.
+    pub peak_bytes: u64,
+}
+
+/// Describes a context. Any thread.
+///
+/// Errors: HRR_ERROR_INVALID_ARGUMENT, HRR_ERROR_ABI.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn hrr_context_info(
+    context: *const HrrContext,
+    info: *mut HrrContextInfo,
+) -> HrrStatus {
+    guard(|| {
+        // SAFETY: this module's contract.
+        let (context, (out, struct_size)) =
+            unsafe { (pointer::object(context, "context")?, pointer::sized_out(info, "info")?) };
+        let (bytes, peak_bytes) = context.account.figures();
+        let threads = context.pool.threads() as u32;
+        out.write(HrrContextInfo { struct_size, threads, bytes, peak_bytes });
+        Ok(())
+    })
 }
 
 /// Frees the memory that the context keeps for its next build. Any thread.

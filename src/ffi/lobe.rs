@@ -5,6 +5,7 @@ use super::status::{Failure, HrrStatus, Outcome, guard};
 use crate::math::Frame;
 use crate::roulette::{self, Lobe, MAX_LOBES};
 use glam::DVec3;
+use smallvec::SmallVec;
 
 /// Most lobes of one query.
 pub const HRR_MAX_LOBES: u32 = 8;
@@ -45,6 +46,7 @@ impl From<Lobe> for HrrLobe {
 
 impl HrrLobe {
     /// The library's lobe; `name` for the message.
+    #[inline]
     pub(super) fn check(&self, name: impl Fn() -> String) -> Outcome<Lobe> {
         let [x, y, z] = [self.x, self.y, self.z].map(DVec3::from_array);
         let numbers = [self.alpha_x, self.alpha_y, self.weight];
@@ -69,29 +71,23 @@ impl HrrLobe {
     }
 }
 
-/// The lobes of a query, in a place that needs no allocation.
-pub(super) struct Lobes {
-    lobes: [Lobe; MAX_LOBES],
-    count: usize,
-}
+/// The lobes of a query, in a place that needs no allocation, and that is not moved about.
+#[derive(Default)]
+pub(super) struct Lobes(SmallVec<[Lobe; MAX_LOBES]>);
 
 impl Lobes {
-    pub unsafe fn read(lobes: *const HrrLobe, count: u32) -> Outcome<Self> {
+    #[inline]
+    pub unsafe fn read(&mut self, lobes: *const HrrLobe, count: u32) -> Outcome<&[Lobe]> {
         if count > HRR_MAX_LOBES {
             return Err(Failure::argument(format!("{count} lobes: at most {HRR_MAX_LOBES}")));
         }
-        let mut read = Self { lobes: [Lobe::NONE; MAX_LOBES], count: count as usize };
-        for i in 0..read.count {
+        for i in 0..count as usize {
             // SAFETY: below `count`, which the caller vouches for; NULL stays NULL.
             let lobe =
                 unsafe { pointer::copy(lobes.wrapping_add(if lobes.is_null() { 0 } else { i }), "lobes") }?;
-            read.lobes[i] = lobe.check(|| format!("lobes[{i}]"))?;
+            self.0.push(lobe.check(|| format!("lobes[{i}]"))?);
         }
-        Ok(read)
-    }
-
-    pub fn get(&self) -> &[Lobe] {
-        &self.lobes[..self.count]
+        Ok(&self.0)
     }
 }
 
@@ -251,10 +247,11 @@ pub unsafe extern "C" fn hrr_probability(
         // SAFETY: this module's contract.
         unsafe {
             let out = Out::new(out_probability, "out_probability")?;
-            let lobes = Lobes::read(lobes, lobe_count)?;
+            let mut read = Lobes::default();
+            let lobes = read.read(lobes, lobe_count)?;
             let constant = self::constant(constant)?;
             let offset = pointer::vector(offset, "offset")?;
-            out.write(roulette::probability(lobes.get(), constant, offset));
+            out.write(roulette::probability(lobes, constant, offset));
         }
         Ok(())
     })

@@ -1,7 +1,36 @@
 //! What a host's pointers point to, checked as far as can be.
 
 use super::status::{Failure, HRR_ERROR_ABI, Outcome};
+use std::ffi::{CStr, c_char, c_void};
 use std::sync::Arc;
+
+/// A function of the host's and what it is called with.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Callback<F> {
+    pub function: F,
+    pub user: *mut c_void,
+}
+
+// SAFETY: the pointer is only ever handed to the host's function, which hosts make callable from any thread.
+unsafe impl<F: Send> Send for Callback<F> {}
+// SAFETY: as above.
+unsafe impl<F: Sync> Sync for Callback<F> {}
+
+impl<F> Callback<F> {
+    pub fn new(function: Option<F>, user: *mut c_void) -> Option<Self> {
+        function.map(|function| Self { function, user })
+    }
+}
+
+/// A text of the host's, in UTF-8.
+pub(super) unsafe fn text<'a>(pointer: *const c_char, name: &str) -> Outcome<&'a str> {
+    if pointer.is_null() {
+        return Err(Failure::argument(format!("{name} is NULL")));
+    }
+    // SAFETY: not NULL; the caller vouches that it ends with a zero.
+    let text = unsafe { CStr::from_ptr(pointer) };
+    text.to_str().map_err(|_| Failure::argument(format!("{name} is not UTF-8: {text:?}")))
+}
 
 /// A handle's object, kept alive by the host.
 pub(super) unsafe fn object<'a, T>(handle: *const T, name: &str) -> Outcome<&'a T> {
@@ -49,6 +78,14 @@ impl<T> Out<T> {
     /// Checks the pointer that a result will be written to.
     pub unsafe fn new(pointer: *mut T, name: &str) -> Outcome<Self> {
         aligned(pointer.cast_const(), name)?;
+        Ok(Self(pointer))
+    }
+
+    /// As [`Out::new`], for `count` results; NULL is fine when there are none.
+    pub unsafe fn array(pointer: *mut T, count: usize, name: &str) -> Outcome<Self> {
+        if count > 0 {
+            aligned(pointer.cast_const(), name)?;
+        }
         Ok(Self(pointer))
     }
 
@@ -107,6 +144,15 @@ pub(super) unsafe fn struct_size<T>(pointer: *const T, name: &str) -> Outcome<us
         return Err(Failure::new(HRR_ERROR_ABI, message));
     }
     Ok(size as usize)
+}
+
+/// The place of a result that begins with its size, and that size.
+pub(super) unsafe fn sized_out<T>(pointer: *mut T, name: &str) -> Outcome<(Out<T>, u32)> {
+    // SAFETY: passed on; the size is read after the pointer was found to be good.
+    unsafe {
+        let out = Out::new(pointer, name)?;
+        Ok((out, struct_size(pointer, name)? as u32))
+    }
 }
 
 /// A copy of a struct that begins with its size. One from a newer header must ask for nothing new.

@@ -1,6 +1,7 @@
 //! Queries: an eye vertex and its lobes in, accepted light vertices out.
 
 use super::cache::HrrCache;
+use super::capture::{Made, Seen};
 use super::lobe::{HrrLobe, Lobes, constant};
 use super::pointer::{self, Out};
 use super::status::{Failure, HRR_ERROR_BUFFER_TOO_SMALL, HRR_ERROR_CALLBACK, HrrStatus, Outcome, guard};
@@ -109,28 +110,42 @@ impl Options {
         }
         // SAFETY: passed on.
         let o = unsafe { pointer::sized(options, "options") }?;
-        let rule = match o.rule {
+        if o.reserved != 0 {
+            return Err(Failure::argument(format!("options->reserved is {}, not 0", o.reserved)));
+        }
+        Self::new(o.rule, o.brute_force)
+    }
+
+    pub fn new(rule: u32, brute_force: u32) -> Outcome<Self> {
+        let rule = match rule {
             HRR_RULE_NESTED => MinimumRandom::Nested,
             HRR_RULE_SEMI_STRATIFIED => MinimumRandom::SemiStratified,
             HRR_RULE_EXACT => MinimumRandom::Exact,
             rule => return Err(Failure::argument(format!("options->rule is {rule}: no HRR_RULE_*"))),
         };
-        if o.brute_force > 1 || o.reserved != 0 {
-            let (b, r) = (o.brute_force, o.reserved);
-            let message = format!("options->brute_force is {b} (0 or 1), options->reserved {r} (0)");
-            return Err(Failure::argument(message));
+        if brute_force > 1 {
+            return Err(Failure::argument(format!("options->brute_force is {brute_force}: it is 0 or 1")));
         }
-        Ok(Self { rule, brute_force: o.brute_force == 1 })
+        Ok(Self { rule, brute_force: brute_force == 1 })
     }
 }
 
-/// Answers a query; `visit` gets every hit.
+/// HRR_RULE_* of a rule.
+pub(super) fn rule_number(rule: MinimumRandom) -> u32 {
+    match rule {
+        MinimumRandom::Nested => HRR_RULE_NESTED,
+        MinimumRandom::SemiStratified => HRR_RULE_SEMI_STRATIFIED,
+        MinimumRandom::Exact => HRR_RULE_EXACT,
+    }
+}
+
+/// Answers a query; `visit` gets every hit, and its index in the build.
 pub(super) unsafe fn run(
     cache: &HrrCache,
     ask: &HrrQuery,
     options: Options,
     counters: &mut QueryCounters,
-    mut visit: impl FnMut(HrrHit),
+    mut visit: impl FnMut(u32, HrrHit),
 ) -> Outcome {
     let position = DVec3::from_array(ask.position);
     if !position.is_finite() {
@@ -139,17 +154,29 @@ pub(super) unsafe fn run(
     if ask.mask == 0 {
         return Err(Failure::argument("query->mask is 0: no light vertex shares a bit with it"));
     }
+    let mut read = Lobes::default();
     // SAFETY: passed on.
-    let lobes = unsafe { Lobes::read(ask.lobes, ask.lobe_count) }?;
+    let lobes = unsafe { read.read(ask.lobes, ask.lobe_count) }?;
     let constant = constant(ask.constant)?;
-    let mut inner = Query::new(cache.relative(position), lobes.get(), constant, ask.key);
+    let mut inner = Query::new(cache.relative(position), lobes, constant, ask.key);
     (inner.mask, inner.rule) = (ask.mask, options.rule);
-    let (bvh, ids) = (&cache.storage.bvh, &cache.storage.ids);
-    let mut found = |index: u32, probability| visit(HrrHit { id: ids[index as usize], probability });
+    let bvh = &cache.storage.bvh;
+    let (captured, mut seen) = (cache.capture.is_on(), Seen::default());
+    let mut found = |index: u32, probability| {
+        let id = cache.storage.id(index);
+        if captured {
+            seen.add(id, probability);
+        }
+        visit(index, HrrHit { id, probability });
+    };
     if options.brute_force {
         query_brute_force(bvh, &inner, counters, &mut found);
     } else {
         query(bvh, &inner, counters, &mut found);
+    }
+    if captured {
+        let Options { rule, brute_force } = options;
+        cache.capture.record(&Made { cache, ask, lobes, rule, brute_force, seen });
     }
     Ok(())
 }
@@ -166,7 +193,7 @@ pub extern "C" fn hrr_key(seed: u64, iteration: u64, pixel: u64, depth: u64) -> 
 /// 0. options, counters: NULL if not wanted.
 ///
 /// The same key and cache give the same hits in the same order, on any thread and machine. Any thread; takes no lock,
-/// and allocates nothing unless it fails.
+/// and allocates nothing unless it fails (or is captured: hrr_capture_begin).
 ///
 /// Errors: HRR_ERROR_INVALID_ARGUMENT, HRR_ERROR_NON_FINITE, HRR_ERROR_ABI, HRR_ERROR_BUFFER_TOO_SMALL.
 #[unsafe(no_mangle)]
@@ -190,7 +217,7 @@ pub unsafe extern "C" fn hrr_query(
             let out_count = Out::new(out_count, "out_count")?;
             let counters = Out::optional(counters, "counters")?;
             let mut count = 0;
-            run(cache, &ask, options, &mut did, |hit| {
+            run(cache, &ask, options, &mut did, |_, hit| {
                 // SAFETY: below the capacity.
                 if let Some(hits) = hits.as_ref().filter(|_| count < capacity) {
                     hits.write_at(count as usize, hit);
@@ -232,7 +259,7 @@ pub unsafe extern "C" fn hrr_query_visit(
             let visit = visit.ok_or_else(|| Failure::argument("visit is NULL"))?;
             let counters = Out::optional(counters, "counters")?;
             let mut answer = 0;
-            run(cache, &ask, options, &mut did, |hit| {
+            run(cache, &ask, options, &mut did, |_, hit| {
                 if answer == 0 {
                     answer = visit(user, &hit);
                 }

@@ -1,6 +1,9 @@
 //! The host's light vertices: read where they lie, checked, gathered.
 
+use super::memory::Held;
 use super::pointer::Strided;
+use super::points::Points;
+use super::progress::Progress;
 use super::status::{Failure, HRR_ERROR_OUT_OF_MEMORY, Outcome};
 use crate::vertex_bvh::MAX_VERTICES;
 use glam::{DVec3, Vec3};
@@ -46,7 +49,14 @@ pub(super) struct Gathered {
     /// What was subtracted from the positions before they were rounded.
     pub origin: DVec3,
     pub dropped: u64,
+    pub held: Option<Held>,
 }
+
+/// Vertices after which the host is asked whether to go on.
+const LOOK: usize = 1 << 16;
+
+/// How much of a build gathering is.
+const GATHERING: f64 = 0.25;
 
 /// How to gather.
 #[derive(Debug, Clone, Copy)]
@@ -58,12 +68,11 @@ pub(super) struct Rules {
 }
 
 /// Doubles up to here can be told from each other's distance in single precision without overflow.
-const MAX_DOUBLE: f64 = 1e38;
+pub(super) const MAX_DOUBLE: f64 = 1e38;
 
 /// A segment whose numbers make sense.
 struct Checked {
-    floats: Strided<[f32; 3]>,
-    doubles: Strided<[f64; 3]>,
+    positions: Points,
     masks: Option<Strided<u32>>,
     ids: Option<Strided<u64>>,
     count: usize,
@@ -78,41 +87,38 @@ impl Checked {
             let message = format!("{} is {}: at most 2^31", name("count"), segment.count);
             return Err(Failure::argument(message));
         };
+        let format = if double { HRR_DOUBLE3 } else { HRR_FLOAT3 };
         let (at, stride) = (segment.position, segment.position_stride);
-        let (n_floats, n_doubles) = if double { (0, count) } else { (count, 0) };
-        let unused = |used: bool| if used { stride } else { 0 };
         // SAFETY: the caller passes on its own caller's word for the arrays.
         unsafe {
-            let floats = Strided::new(at.cast(), unused(!double), n_floats, &name("position"))?;
-            let doubles = Strided::new(at.cast(), unused(double), n_doubles, &name("position"))?;
+            let positions = Points::new(at, stride, count, format, &name("position"))?;
             let masks = (!segment.mask.is_null())
                 .then(|| Strided::new(segment.mask, segment.mask_stride, count, &name("mask")))
                 .transpose()?;
             let ids = (!segment.id.is_null())
                 .then(|| Strided::new(segment.id, segment.id_stride, count, &name("id")))
                 .transpose()?;
-            Ok(Self { floats, doubles, masks, ids, count, first_id: segment.first_id })
+            Ok(Self { positions, masks, ids, count, first_id: segment.first_id })
         }
     }
 
     /// A position, when it is of any use.
-    fn position(&self, index: usize, double: bool) -> Result<DVec3, DVec3> {
+    fn position(&self, index: usize) -> Result<DVec3, DVec3> {
         debug_assert!(index < self.count);
         // SAFETY: below the count that the array was given with.
-        let p = if double {
-            DVec3::from_array(unsafe { self.doubles.get(index) })
-        } else {
-            Vec3::from_array(unsafe { self.floats.get(index) }).as_dvec3()
-        };
-        let fits = p.is_finite() && (!double || p.abs().max_element() <= MAX_DOUBLE);
-        if fits { Ok(p) } else { Err(p) }
+        unsafe { self.positions.get(index) }
     }
 }
 
 impl Gathered {
     /// Reads all segments.
-    pub unsafe fn fill(&mut self, segments: Strided<HrrSegment>, count: usize, rules: Rules) -> Outcome {
-        self.clear();
+    pub unsafe fn fill(
+        &mut self,
+        segments: Strided<HrrSegment>,
+        count: usize,
+        rules: Rules,
+        progress: Progress,
+    ) -> Outcome {
         let mut total = 0u64;
         // SAFETY: `segments` has `count` of them; the caller passes on its own caller's word for their arrays.
         let checked = |i: usize| unsafe { Checked::new(&segments.get(i), i, rules.double) };
@@ -123,7 +129,10 @@ impl Gathered {
             total += segment.count as u64;
             masked |= segment.masks.is_some();
             for i in 0..segment.count {
-                match segment.position(i, rules.double) {
+                if i % LOOK == 0 {
+                    progress.at(0.0)?;
+                }
+                match segment.position(i) {
                     Ok(p) => (low, high) = (low.min(p), high.max(p)),
                     Err(_) if rules.drop => self.dropped += 1,
                     Err(p) => {
@@ -144,7 +153,10 @@ impl Gathered {
         for number in 0..count {
             let segment = checked(number)?;
             for i in 0..segment.count {
-                let Ok(p) = segment.position(i, rules.double) else { continue };
+                if i % LOOK == 0 {
+                    progress.at(GATHERING * self.ids.len() as f64 / kept.max(1) as f64)?;
+                }
+                let Ok(p) = segment.position(i) else { continue };
                 self.positions.push((p - self.origin).as_vec3());
                 // SAFETY: i is below the count that the arrays were given with.
                 let (mask, id) =
@@ -161,7 +173,7 @@ impl Gathered {
         Ok(())
     }
 
-    fn clear(&mut self) {
+    pub fn clear(&mut self) {
         self.positions.clear();
         self.masks.clear();
         self.ids.clear();
@@ -169,7 +181,11 @@ impl Gathered {
         self.dropped = 0;
     }
 
-    fn reserve(&mut self, count: usize, masked: bool) -> Outcome {
+    pub fn bytes(&self) -> u64 {
+        (size_of_val(&self.positions[..]) + size_of_val(&self.masks[..]) + 8 * self.ids.capacity()) as u64
+    }
+
+    pub fn reserve(&mut self, count: usize, masked: bool) -> Outcome {
         let masks = if masked { count } else { 0 };
         self.positions
             .try_reserve(count)

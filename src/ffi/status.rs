@@ -9,20 +9,26 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 /// What a call returns: HRR_OK or one of HRR_ERROR_*. An integer, so that numbers of later versions stay defined.
 pub type HrrStatus = i32;
 
-// Numbers are never reused; those that are missing here are for calls to come.
+// Numbers are never reused.
 
 /// The call did what it says.
 pub const HRR_OK: HrrStatus = 0;
 /// An argument is NULL, out of its range or contradicts another.
 pub const HRR_ERROR_INVALID_ARGUMENT: HrrStatus = 1;
+/// The call does not fit what was called before: an end without a beginning, two beginnings.
+pub const HRR_ERROR_INVALID_STATE: HrrStatus = 2;
 /// An input is NaN, infinite, or too large for single precision; the message names it.
 pub const HRR_ERROR_NON_FINITE: HrrStatus = 3;
 /// The memory is not there, or max_bytes does not allow it.
 pub const HRR_ERROR_OUT_OF_MEMORY: HrrStatus = 4;
+/// The host's progress function ended the call.
+pub const HRR_ERROR_CANCELLED: HrrStatus = 5;
 /// The results do not fit; the number that would is written. The same call again gives the same results.
 pub const HRR_ERROR_BUFFER_TOO_SMALL: HrrStatus = 6;
 /// Header and library do not belong together, or a struct_size is none.
 pub const HRR_ERROR_ABI: HrrStatus = 7;
+/// A file cannot be read or written, or is not what it should be; the message names it, with the line where it has any.
+pub const HRR_ERROR_IO: HrrStatus = 8;
 /// A function of the host asked to stop, or did not do its work.
 pub const HRR_ERROR_CALLBACK: HrrStatus = 9;
 /// A bug in this library, caught at its border.
@@ -64,7 +70,7 @@ impl Failure {
     }
 
     /// Keeps the message for this thread's `hrr_last_error`.
-    fn record(self) -> HrrStatus {
+    pub fn record(self) -> HrrStatus {
         let text = CString::new(self.message.replace('\0', " ")).unwrap_or_default();
         // A thread that is ending has nobody left to ask.
         let _ = LAST_ERROR.try_with(|last| *last.borrow_mut() = text);
@@ -76,6 +82,7 @@ impl From<Error> for Failure {
     fn from(error: Error) -> Self {
         let status = match &error {
             Error::Memory(_) => HRR_ERROR_OUT_OF_MEMORY,
+            Error::Scene { .. } | Error::Output { .. } => HRR_ERROR_IO,
             Error::Internal(_) => HRR_ERROR_INTERNAL,
             _ => HRR_ERROR_INVALID_ARGUMENT,
         };
@@ -114,11 +121,21 @@ pub extern "C" fn hrr_version() -> u32 {
     MAJOR << 16 | MINOR << 8 | PATCH
 }
 
-/// The library's version as text. Static: never freed. Any thread.
+/// The library's version as text, and the libraries it was built with. Static: never freed. Any thread.
 #[unsafe(no_mangle)]
 pub extern "C" fn hrr_version_string() -> *const c_char {
-    const TEXT: &str = concat!("hrr ", env!("CARGO_PKG_VERSION"), "\0");
-    TEXT.as_ptr().cast()
+    macro_rules! text {
+        ($with:literal) => {
+            concat!("hrr ", env!("CARGO_PKG_VERSION"), $with, "\0")
+        };
+    }
+    let text = match (cfg!(feature = "embree"), cfg!(feature = "oiio")) {
+        (true, true) => text!(" (embree, oiio)"),
+        (true, false) => text!(" (embree)"),
+        (false, true) => text!(" (oiio)"),
+        (false, false) => text!(""),
+    };
+    text.as_ptr().cast()
 }
 
 /// HRR_OK when the library serves the interface of the header; call hrr_check_abi(HRR_ABI) first. Any thread.
@@ -141,10 +158,13 @@ pub extern "C" fn hrr_status_name(status: HrrStatus) -> *const c_char {
     let name: &CStr = match status {
         HRR_OK => c"HRR_OK",
         HRR_ERROR_INVALID_ARGUMENT => c"HRR_ERROR_INVALID_ARGUMENT",
+        HRR_ERROR_INVALID_STATE => c"HRR_ERROR_INVALID_STATE",
         HRR_ERROR_NON_FINITE => c"HRR_ERROR_NON_FINITE",
         HRR_ERROR_OUT_OF_MEMORY => c"HRR_ERROR_OUT_OF_MEMORY",
+        HRR_ERROR_CANCELLED => c"HRR_ERROR_CANCELLED",
         HRR_ERROR_BUFFER_TOO_SMALL => c"HRR_ERROR_BUFFER_TOO_SMALL",
         HRR_ERROR_ABI => c"HRR_ERROR_ABI",
+        HRR_ERROR_IO => c"HRR_ERROR_IO",
         HRR_ERROR_CALLBACK => c"HRR_ERROR_CALLBACK",
         HRR_ERROR_PANIC => c"HRR_ERROR_PANIC",
         HRR_ERROR_INTERNAL => c"HRR_ERROR_INTERNAL",

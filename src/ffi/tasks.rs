@@ -1,23 +1,16 @@
 //! Tasks on the host's threads or on the context's.
 
 use super::context::{HrrContext, HrrParallelForFn, HrrTaskFn};
+use super::pointer::Callback;
 use super::status::{Failure, HRR_ERROR_CALLBACK, Outcome};
 use rayon::prelude::*;
 use std::ffi::c_void;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
-/// A host's `parallel_for` and what it is called with.
+/// A host's `parallel_for`.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct HostThreads {
-    parallel_for: unsafe extern "C" fn(*mut c_void, u32, HrrTaskFn, *mut c_void),
-    user: *mut c_void,
-}
-
-// SAFETY: the pointer is only ever handed to the host's function, which hosts make callable from any thread.
-unsafe impl Send for HostThreads {}
-// SAFETY: as above.
-unsafe impl Sync for HostThreads {}
+pub(super) struct HostThreads(Callback<unsafe extern "C" fn(*mut c_void, u32, HrrTaskFn, *mut c_void)>);
 
 struct Job<'a> {
     body: &'a (dyn Fn(usize) + Sync),
@@ -48,7 +41,7 @@ unsafe extern "C" fn run_one(job: *mut c_void, index: u32) {
 
 impl HostThreads {
     pub fn new(parallel_for: HrrParallelForFn, user: *mut c_void) -> Option<Self> {
-        parallel_for.map(|parallel_for| Self { parallel_for, user })
+        Callback::new(parallel_for, user).map(Self)
     }
 
     fn run(&self, count: usize, body: &(dyn Fn(usize) + Sync)) -> Outcome {
@@ -56,7 +49,7 @@ impl HostThreads {
         let job = Job { body, taken, done: AtomicUsize::new(0), panicked: AtomicBool::new(false) };
         let data = (&raw const job).cast_mut().cast();
         // SAFETY: the host's function, called as its type says; the job outlives the call.
-        unsafe { (self.parallel_for)(self.user, count as u32, Some(run_one), data) };
+        unsafe { (self.0.function)(self.0.user, count as u32, Some(run_one), data) };
         assert!(!job.panicked.load(Ordering::Acquire), "a task panicked");
         let done = job.done.load(Ordering::Acquire);
         if done < count {

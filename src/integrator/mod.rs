@@ -7,6 +7,7 @@ pub mod bidirectional;
 mod guiding;
 mod merging;
 mod records;
+mod spread;
 mod tile;
 
 pub use recipe::Recipe;
@@ -46,8 +47,12 @@ pub trait Integrator {
     /// As [`new`].
     fn resize(&mut self, size: Size) -> Result<()>;
 
+    /// From now on, eye samples of an iteration go to the pixels that need them, as those before showed. Iterations then
+    /// depend on those before.
+    fn adapt(&mut self) {}
+
     /// Runs one iteration and adds it to the film, its samples counted. The result depends on the seed and the
-    /// iteration's number alone. `progress` is told the finished fraction now and then, from any thread.
+    /// iteration's number alone, unless it adapts. `progress` is told the finished fraction now and then, from any thread.
     fn iterate(&mut self, iteration: u64, film: &mut Film, progress: &(dyn Fn(f64) + Sync)) -> Result<Tally>;
 
     /// Bytes held in the light-vertex cache and in its tree.

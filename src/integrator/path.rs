@@ -1,6 +1,7 @@
 //! Path tracing with next-event estimation: code of its own, so that it can bear witness against the bidirectional
 //! machine.
 
+use super::spread::Adaptive;
 use super::tile::{self, Sample};
 use super::{Integrator, Size};
 use crate::bsdf::Transport;
@@ -19,12 +20,13 @@ pub struct PathTracer<'a> {
     world: &'a World<'a>,
     settings: &'a Settings,
     samples: u32,
+    adaptive: Option<Adaptive>,
 }
 
 impl<'a> PathTracer<'a> {
     /// A path tracer for a world.
     pub fn new(world: &'a World<'a>, settings: &'a Settings) -> Self {
-        Self { world, settings, samples: Size::of(settings, &world.scene.film).samples }
+        Self { world, settings, samples: Size::of(settings, &world.scene.film).samples, adaptive: None }
     }
 
     fn radiance(&self, sample: &Sample, clock: Clock, tally: &mut Tally) -> Spectrum {
@@ -95,15 +97,25 @@ impl<'a> PathTracer<'a> {
 impl Integrator for PathTracer<'_> {
     fn resize(&mut self, size: Size) -> Result<()> {
         self.samples = size.samples;
+        if let Some(adaptive) = &mut self.adaptive {
+            adaptive.plan(size.samples);
+        }
         Ok(())
+    }
+
+    fn adapt(&mut self) {
+        self.adaptive = Some(Adaptive::new(&self.world.scene.film));
     }
 
     fn iterate(&mut self, iteration: u64, film: &mut Film, progress: &(dyn Fn(f64) + Sync)) -> Result<Tally> {
         let key = (self.settings.seed, iteration, self.samples);
         let start = Instant::now();
-        let mut tally = tile::sample_film(film, key, progress, |sample, clock, tally| {
-            self.radiance(sample, clock, tally)
+        // Set aside, since the samples look at the rest of the path tracer.
+        let mut adaptive = self.adaptive.take();
+        let mut tally = tile::sample_film(film, key, adaptive.as_mut(), progress, |sample, clock, tally| {
+            self.radiance(sample, clock, tally).into()
         });
+        self.adaptive = adaptive;
         tally.sides[1] = start.elapsed().as_secs_f64();
         film.count_samples(u64::from(self.samples));
         Ok(tally)

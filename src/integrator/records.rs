@@ -140,15 +140,13 @@ fn trace(
         if !vertex.walk.vertex.bsdf.is_delta() && vertex.lobes.is_empty() {
             let contributions: Vec<f64> = lights
                 .iter()
-                .map(|light| {
-                    match vertex.connect(techniques, light, techniques.base * techniques.stored(light), 1.0) {
-                        Some((value, ray)) => {
-                            rays += 1;
-                            let free = !world.visibility.occluded(&ray);
-                            if free { luminance(value) } else { 0.0 }
-                        }
-                        None => 0.0,
+                .map(|light| match vertex.connect(techniques, light, techniques.base, 1.0) {
+                    Some((value, ray)) => {
+                        rays += 1;
+                        let free = !world.visibility.occluded(&ray);
+                        if free { luminance(value) } else { 0.0 }
                     }
+                    None => 0.0,
                 })
                 .collect();
             // Where nothing arrives, neighbours may know better.

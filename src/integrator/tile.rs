@@ -1,7 +1,7 @@
 //! Pixels in square tiles, spread over threads.
 
+use super::spread::{Adaptive, PixelPlan, PixelSums, Seen};
 use crate::film::Film;
-use crate::math::Spectrum;
 use crate::sampler::{Purpose, Sampler, Stream};
 use crate::tally::{Clock, Tally};
 use glam::DVec2;
@@ -9,6 +9,10 @@ use rayon::prelude::*;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 const SIDE: u32 = 16;
+
+/// Pixels of a tile, and what was seen there.
+type Watched = Vec<(u32, u32, PixelSums)>;
+
 /// One tile in this many has its shadow rays and queries timed.
 const TIMED: usize = 16;
 
@@ -23,23 +27,27 @@ pub struct Sample {
     pub index: u64,
     /// Its random numbers.
     pub sampler: Sampler,
+    /// How often it counts as having played the roulette; 0: it does not play.
+    pub plays: f64,
 }
 
-/// Takes `samples` samples of every pixel of a film and adds what `radiance` makes of them. The time less what
-/// `radiance` itself puts into `roulette_seconds` and `visibility` is `eye_trace`.
-pub fn sample_film(
+/// Takes samples of every pixel of a film, `samples` or what `adaptive` says, and adds what `radiance` makes of them. The
+/// time less what `radiance` itself puts into `roulette_seconds` and `visibility` is `eye_trace`.
+pub(super) fn sample_film(
     film: &Film,
     (seed, iteration, samples): (u64, u64, u32),
+    adaptive: Option<&mut Adaptive>,
     progress: &(dyn Fn(f64) + Sync),
-    radiance: impl Fn(&Sample, Clock, &mut Tally) -> Spectrum + Sync,
+    radiance: impl Fn(&Sample, Clock, &mut Tally) -> Seen + Sync,
 ) -> Tally {
     let (width, height) = (film.width(), film.height());
     let (across, down) = (width.div_ceil(SIDE), height.div_ceil(SIDE));
     let (tiles, done) = ((across * down) as usize, AtomicUsize::new(0));
-    (0..tiles)
+    let plans = adaptive.as_deref();
+    let parts: Vec<(Tally, Watched)> = (0..tiles)
         .into_par_iter()
         .map(|tile| {
-            let mut tally = Tally::default();
+            let (mut tally, mut watched) = (Tally::default(), Vec::new());
             let clock = Clock::sampled(tile, TIMED.min(tiles));
             let (left, top) = (tile as u32 % across * SIDE, tile as u32 / across * SIDE);
             let mut seconds = 0.0;
@@ -47,24 +55,47 @@ pub fn sample_film(
                 for y in top..(top + SIDE).min(height) {
                     for x in left..(left + SIDE).min(width) {
                         let pixel = u64::from(y) * u64::from(width) + u64::from(x);
-                        let values = (0..samples).map(|n| {
+                        let plan = plans
+                            .map_or(PixelPlan { samples, share: 1.0 }, |plans| plans.pixel(x, y, samples));
+                        // A pixel of fewer or more samples than it counts.
+                        let scale = f64::from(samples) / f64::from(plan.samples);
+                        let mut sums = PixelSums::default();
+                        let values = (0..plan.samples).map(|n| {
                             let index = pixel * u64::from(samples) + u64::from(n);
                             let sampler = Sampler::in_family(seed, iteration, Stream::Eye, pixel, n);
                             let raster = DVec2::new(x.into(), y.into()) + sampler.u2(0, Purpose::Raster);
-                            let sample = Sample { raster, index, sampler };
-                            (raster, radiance(&sample, clock, &mut tally))
+                            let plays = plan.plays(n, pixel_offset(seed, iteration, pixel));
+                            let sample = Sample { raster, index, sampler, plays };
+                            let seen = radiance(&sample, clock, &mut tally);
+                            if plans.is_some() {
+                                sums.add(&seen, plan.share);
+                            }
+                            (raster, seen.radiance * scale)
                         });
                         film.add_samples(x, y, values);
+                        tally.camera_rays += u64::from(plan.samples);
+                        if plans.is_some() {
+                            watched.push((x, y, sums));
+                        }
                     }
                 }
             });
-            tally.camera_rays += u64::from((left + SIDE).min(width) - left)
-                * u64::from((top + SIDE).min(height) - top)
-                * u64::from(samples);
             tally.eye_trace += seconds;
             progress((done.fetch_add(1, Ordering::Relaxed) + 1) as f64 / tiles as f64);
-            tally
+            (tally, watched)
         })
-        .reduce(Tally::default, Tally::plus)
-        .less_parts_of_eye_trace()
+        .collect();
+    let tally =
+        parts.iter().fold(Tally::default(), |sum, (tally, _)| sum.plus(*tally)).less_parts_of_eye_trace();
+    if let Some(adaptive) = adaptive {
+        for (_, pixels) in &parts {
+            adaptive.learn(pixels, &tally);
+        }
+    }
+    tally
+}
+
+/// Where a pixel begins to count which of its samples play the roulette.
+fn pixel_offset(seed: u64, iteration: u64, pixel: u64) -> f64 {
+    Sampler::new(seed, iteration, Stream::Pixel, pixel).u1(0, Purpose::Roulette)
 }

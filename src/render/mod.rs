@@ -13,7 +13,7 @@ use crate::error::{Error, Result};
 use crate::film::Film;
 use crate::integrator::{self, Size};
 use crate::scene::Scene;
-use crate::settings::{Integrator, Settings};
+use crate::settings::{Integrator, Settings, Switch};
 use crate::subpath::World;
 use crate::tally::Tally;
 use sizing::{Measured, Sizing};
@@ -62,6 +62,9 @@ fn run(scene: &Scene, settings: &Settings, observer: &dyn Observer) -> Result<Ou
     let sizing = Sizing::new(&settings, &scene.film);
     let mut sizes: Vec<(Size, u32)> = sizing.iter().map(|_| (size, 1)).collect();
     let mut integrator = integrator::new(&world, &settings)?;
+    if sizing.is_some() && settings.adaptive == Switch::On {
+        integrator.adapt();
+    }
     let mut film = Film::new(&scene.film);
     let mut tally = Tally::default();
     let mut bytes = (0, 0);

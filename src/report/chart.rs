@@ -137,6 +137,11 @@ fn ticks((low, high): (f64, f64)) -> Vec<(f64, String)> {
 
 /// A number as one reads it: two digits that count.
 pub fn number(x: f64) -> String {
+    digits(x, 2)
+}
+
+/// A number with as many digits that count.
+pub fn digits(x: f64, digits: i32) -> String {
     if x == 0.0 || !x.is_finite() {
         return format!("{x}");
     }
@@ -144,7 +149,7 @@ pub fn number(x: f64) -> String {
     if !(-4..6).contains(&exponent) {
         return format!("{x:.1e}");
     }
-    let decimals = (1 - exponent).max(0) as usize;
+    let decimals = (digits - 1 - exponent).max(0) as usize;
     let text = format!("{x:.decimals$}");
     if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').to_owned() } else { text }
 }
@@ -192,6 +197,7 @@ mod tests {
     fn numbers_are_short() {
         let all = [0.0, 1.0, 0.05, 0.123, 12.34, 1234.0, 1e-7, 2e9].map(number);
         assert_eq!(all, ["0", "1", "0.05", "0.12", "12", "1234", "1.0e-7", "2.0e9"]);
+        assert_eq!([0.1234, 12.34, 5.0].map(|x| digits(x, 3)), ["0.123", "12.3", "5"]);
     }
 
     #[test]

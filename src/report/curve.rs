@@ -207,7 +207,7 @@ mod tests {
         assert!(b.speedup.holds(2.0) && !b.is_unresolved(), "{b:?}");
         assert!(a.is_unresolved());
         // Of equals, one in ten pairs is told apart by chance.
-        let equal = |key| {
+        let equal = |key: u64| {
             let both = [rows("a", 1.0, 1.0, 2 * key), rows("b", 1.0, 1.0, 2 * key + 1)].concat();
             curves(&Results { about: Vec::new(), rows: both })[1].is_unresolved()
         };

@@ -160,7 +160,9 @@ fn table(curves: &[Curve]) -> String {
                 number(c.unit.high * 1e4)
             )
         };
-        let speed = if c.is_unresolved() {
+        let speed = if c.name == curves[0].name {
+            "1".to_owned()
+        } else if c.is_unresolved() {
             "not resolved".to_owned()
         } else {
             format!("x {} ({} to {})", number(c.speedup.value), number(c.speedup.low), number(c.speedup.high))
@@ -222,7 +224,7 @@ fn slider(pictures: &Pictures) -> String {
 }
 
 fn percent(share: f64) -> String {
-    format!("{} %", number(100.0 * share))
+    format!("{} %", chart::digits(100.0 * share, 3))
 }
 
 fn seconds(s: f64) -> String {

@@ -1,10 +1,12 @@
 //! The walk down the tree: numbers, boxes, vertices.
 
-use super::min_random::{Deal, Exact, Nested, SemiStratified};
+use super::min_random::{Deal, Exact, Minimum, Nested, SemiStratified};
 use super::plane::{Box8, FlatLobe, Vec8};
 use super::{MinimumRandom, Query, QueryCounters, probability};
 use crate::vertex_bvh::{MAX_LEVELS, NodeId, VertexBvh, WIDTH};
 use fearless_simd::{Level, Simd, dispatch, f32x8, prelude::*};
+use smallvec::SmallVec;
+use std::cell::RefCell;
 
 /// Lobes of a query that take part in culling; with more, every vertex is tested.
 pub const MAX_LOBES: usize = 8;
@@ -42,7 +44,7 @@ pub fn query_brute_force(
 fn start(
     bvh: &VertexBvh,
     query: &Query<'_>,
-    cull: bool,
+    mut cull: bool,
     stats: &mut QueryCounters,
     visit: &mut dyn FnMut(u32, f64),
 ) {
@@ -53,29 +55,59 @@ fn start(
     }
     let high = query.position.as_vec3();
     let low = (query.position - high.as_dvec3()).as_vec3().to_array();
-    let (high, lobes) = (high.to_array(), [FlatLobe::NONE; MAX_LOBES]);
-    let mut walk = Walk { bvh, query, high, low, lobes, count: 0, cull, stats, visit };
+    let mut lobes = SmallVec::<[FlatLobe; MAX_LOBES]>::new();
     for lobe in query.lobes.iter().filter_map(|l| FlatLobe::new(l, query.constant)) {
-        if walk.count == MAX_LOBES {
-            walk.cull = false;
+        if lobes.len() == MAX_LOBES {
+            cull = false;
             break;
         }
-        walk.lobes[walk.count] = lobe;
-        walk.count += 1;
+        lobes.push(lobe);
     }
+    // Another tree's minima bound nothing here.
+    cull &= query.pregenerated.is_none_or(|numbers| numbers.len() == bvh.len());
+    let mut walk = Walk { bvh, query, high: high.to_array(), low, lobes: &lobes, cull, stats, visit };
     if let Some(numbers) = query.pregenerated {
-        // Another tree's minima bound nothing here.
-        walk.cull &= numbers.len() == bvh.len();
-        return dispatch!(Level::new(), simd => walk.run(simd, root, numbers));
+        return dispatch!(Level::new(), simd => walk.run(simd, root, numbers, &mut Waiting::new(())));
     }
-    let key = query.key;
+    let (key, none) = (query.key, Minimum { xi: 0.0, base: 0.0 });
     match query.rule {
-        MinimumRandom::Nested => dispatch!(Level::new(), simd => walk.run(simd, root, Nested { key })),
+        MinimumRandom::Nested => WAITING.with(|kept| {
+            let mut kept = kept.try_borrow_mut();
+            let mut own;
+            let waiting = match &mut kept {
+                Ok(kept) => &mut **kept,
+                // A query within another's visit.
+                Err(_) => {
+                    own = Waiting::new(0.0);
+                    &mut own
+                }
+            };
+            dispatch!(Level::new(), simd => walk.run(simd, root, Nested { key }, waiting));
+        }),
         MinimumRandom::SemiStratified => {
-            dispatch!(Level::new(), simd => walk.run(simd, root, SemiStratified { key }))
+            dispatch!(Level::new(), simd => walk.run(simd, root, SemiStratified { key }, &mut Waiting::new(none)))
         }
-        MinimumRandom::Exact => dispatch!(Level::new(), simd => walk.run(simd, root, Exact { key })),
+        MinimumRandom::Exact => {
+            dispatch!(Level::new(), simd => walk.run(simd, root, Exact { key }, &mut Waiting::new(none)))
+        }
     }
+}
+
+/// Nodes that wait to be looked into, and their numbers.
+struct Waiting<N> {
+    nodes: [u32; STACK],
+    numbers: [N; STACK],
+}
+
+impl<N: Copy> Waiting<N> {
+    const fn new(number: N) -> Self {
+        Self { nodes: [0; STACK], numbers: [number; STACK] }
+    }
+}
+
+thread_local! {
+    /// Kept from query to query: to clear it takes as long as a visit.
+    static WAITING: RefCell<Waiting<f32>> = const { RefCell::new(Waiting::new(0.0)) };
 }
 
 struct Walk<'a> {
@@ -84,8 +116,7 @@ struct Walk<'a> {
     /// The query's position in two f32 parts.
     high: [f32; 3],
     low: [f32; 3],
-    lobes: [FlatLobe; MAX_LOBES],
-    count: usize,
+    lobes: &'a [FlatLobe],
     cull: bool,
     stats: &'a mut QueryCounters,
     visit: &'a mut dyn FnMut(u32, f64),
@@ -93,9 +124,10 @@ struct Walk<'a> {
 
 impl Walk<'_> {
     #[inline(always)]
-    fn run<S: Simd, D: Deal>(&mut self, simd: S, root: NodeId, deal: D) {
+    fn run<S: Simd, D: Deal>(&mut self, simd: S, root: NodeId, deal: D, waiting: &mut Waiting<D::Number>) {
         let number = deal.root(VertexBvh::capacity(root.level));
-        let (mut nodes, mut numbers) = ([root.index; STACK], [number; STACK]);
+        let Waiting { nodes, numbers } = waiting;
+        (nodes[0], numbers[0]) = (root.index, number);
         // Nodes of the current level wait at `first[level]..top`, those of higher levels below.
         let mut first = [0; MAX_LEVELS];
         let (mut level, mut top) = (root.level as usize, 1);
@@ -110,10 +142,11 @@ impl Walk<'_> {
             }
             top -= count;
             let mut chunk = [(0, number); CHUNK];
+            let at = |index| NodeId { level: level as u32, index };
             for i in 0..count {
                 chunk[i] = (nodes[top + i], numbers[top + i]);
+                std::hint::black_box(self.bvh.touch(at(nodes[top + i])));
             }
-            let at = |index| NodeId { level: level as u32, index };
             if level == 0 {
                 // From the top of the stack: in falling order throughout, whatever was culled.
                 for &(index, number) in chunk[..count].iter().rev() {
@@ -174,17 +207,17 @@ impl Walk<'_> {
     fn touched<S: Simd, const POINTS: bool>(&self, numbers: f32x8<S>, boxes: Box8<S>) -> u32 {
         /// For the roundings after the bound itself.
         const SLACK: f32 = 1.00001;
-        let lobes = &self.lobes[..self.count];
-        if let [lobe] = lobes {
+        if let [lobe] = self.lobes {
             let b = boxes.bound::<POINTS>(lobe);
             return (b * b * numbers).simd_gt(SLACK).to_bitmask() as u32 ^ 0xff;
         }
         let mut sum = f32x8::splat(numbers.simd, 0.0);
-        for lobe in lobes {
+        for lobe in self.lobes {
             let b = boxes.bound::<POINTS>(lobe);
             sum += SLACK / (b * b);
         }
-        numbers.simd_le(sum).to_bitmask() as u32
+        // What cannot be compared stays.
+        numbers.simd_gt(sum).to_bitmask() as u32 ^ 0xff
     }
 
     /// The decision proper, in f64, for the vertices of a block that may be near enough.

@@ -95,8 +95,14 @@ impl Lobe {
 
     /// K in a direction (unit or not), in (0,1]; 1 on the axis. Without the weight.
     pub fn k(&self, direction: DVec3) -> f64 {
+        // Of any length: none overflows.
+        let size = direction.abs().max_element();
+        if !(size > 0.0) {
+            return 1.0;
+        }
+        let direction = direction / size;
         let h = self.h(direction);
-        if h > 0.0 { direction.length_squared() / (h * h) } else { 1.0 }
+        (direction.length_squared() / (h * h)).min(1.0)
     }
 
     /// `h(x)` of an offset from the eye vertex, in its unit; 0 for the zero vector only.

@@ -24,31 +24,32 @@ pub(super) struct FlatLobe {
 /// Roundings as a fraction of a box's reach (L1 norms of centre and half extents): of the offset, the rows, the plane.
 const PAD: f32 = 6e-7;
 
+/// The same as a length: what is lost where f32 ends, with denormals flushed to zero.
+const TINY: f32 = 1e-37;
+
+/// Beyond these, what the scale is multiplied by would be denormal, or infinite, in f32.
+const MIN_SCALE: f64 = 1e-30;
+const MAX_SCALE: f64 = 1e30;
+
 /// Ratio of the two roughnesses from which a plane across the thin axis pays.
 const THIN: f64 = 3.0;
 
 impl FlatLobe {
-    /// What stands in for no lobe.
-    pub const NONE: Self = Self {
-        rows: [[0.0; 3]; 3],
-        follow: [[0.0; 3]; 3],
-        inv_support: [[0.0; 3]; 2],
-        thin: None,
-        a2: 1.0,
-        inv_a2: 1.0,
-    };
-
     /// `None` for a lobe that accepts nothing.
     pub fn new(lobe: &Lobe, constant: f64) -> Option<Self> {
-        let power = constant * lobe.weight();
-        if !(power > 0.0) {
+        if !(constant > 0.0 && lobe.weight() > 0.0) {
             return None;
         }
-        let scale = 1.0 / power.sqrt();
+        // Where f32 has no digits for the scale, a range that is too large stands in: the largest is everything.
+        let scale = match 1.0 / (constant * lobe.weight()).sqrt() {
+            s if s < MIN_SCALE => 0.0,
+            s => s.min(MAX_SCALE),
+        };
         let (frame, (ax, ay)) = (lobe.frame(), lobe.alpha());
         let a2 = ax.max(ay) * ax.max(ay);
         let (x, y, z) = (frame.x.as_vec3(), frame.y.as_vec3(), frame.z.as_vec3());
         let (x_row, y_row, z_row) = (x * (scale / ax) as f32, y * (scale / ay) as f32, z * scale as f32);
+        let (x_step, y_step) = (x * (1.0 / ax) as f32, y * (1.0 / ay) as f32);
         let thin = match () {
             _ if ay > THIN * ax => Some(x.to_array()),
             _ if ax > THIN * ay => Some(y.to_array()),
@@ -57,9 +58,8 @@ impl FlatLobe {
         let (scale, ax, ay, a2) = (scale as f32, ax as f32, ay as f32, a2 as f32);
 
         // A world axis along the lobe's brings nothing nearer: the bound only shortens the step there.
-        let length2 = (x_row * x_row + y_row * y_row).max(Vec3::splat(1e-12 * scale * scale));
-        let (x_step, y_step) = (x_row / length2, y_row / length2);
-        let follow = |i: usize| (x_step[i] * x_row + y_step[i] * y_row).to_array();
+        let length2 = (x_step * x_step + y_step * y_step).max(Vec3::splat(1e-12));
+        let follow = |i: usize| ((x_step[i] * x_step + y_step[i] * y_step) / length2[i]).to_array();
 
         // The ellipsoid's centre and half width along the world axes; w - |m| without its cancellation.
         let side2 = (x * ax) * (x * ax) + (y * ay) * (y * ay);
@@ -145,14 +145,14 @@ impl<S: Simd> Box8<S> {
     #[inline(always)]
     pub fn new(simd: S, center: Vec8<S>, half: &[[f32; 8]; 3]) -> Self {
         let half = Vec8::load(simd, half);
-        let pad = (center.abs().sum() + half.sum()) * PAD;
+        let pad = (center.abs().sum() + half.sum()).mul_add(PAD, TINY);
         Self { center, half: half.add_to_each(pad) }
     }
 
     /// Boxes around points: nothing but the pad.
     #[inline(always)]
     pub fn around_points(points: Vec8<S>) -> Self {
-        let pad = points.abs().sum() * PAD;
+        let pad = points.abs().sum().mul_add(PAD, TINY);
         Self { center: points, half: Vec8 { x: pad, y: pad, z: pad } }
     }
 

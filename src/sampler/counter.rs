@@ -3,7 +3,7 @@
 //! A number is a pure function of its key: the same for any thread count and order of work, and switching one
 //! technique off does not shift the numbers of another.
 
-use super::sobol;
+use super::sobol::Place;
 use glam::DVec2;
 
 /// Mixes 64 bits so that every input bit reaches every output bit [Stafford 2011, variant 13].
@@ -36,6 +36,8 @@ pub enum Stream {
     GuideLight = 5,
     /// Eye subpaths of that.
     GuideEye = 6,
+    /// What all samples of a pixel share.
+    Pixel = 7,
 }
 
 /// What a number decides at a vertex.
@@ -85,7 +87,7 @@ const EVEN_DEPTHS: u32 = 3;
 pub struct Sampler {
     key: u64,
     /// Key of the family, and the place in it; `None`: all numbers are independent.
-    family: Option<(u64, u32)>,
+    family: Option<(u64, Place)>,
 }
 
 impl Sampler {
@@ -95,11 +97,12 @@ impl Sampler {
     }
 
     /// Numbers for the subpath `index` of a family (the samples of a pixel, the light subpaths of an iteration): those
-    /// that choose positions, directions and lights near its start are spread evenly over the family [`sobol`], which
+    /// that choose positions, directions and lights near its start are spread evenly over the family ([`super::sobol`]), which
     /// lowers its noise; each subpath's own are as uniform and independent as ever.
+    #[inline]
     pub fn in_family(seed: u64, iteration: u64, stream: Stream, family: u64, index: u32) -> Self {
         let family = combine(combine(combine(seed, iteration), stream as u64), family);
-        Self { key: combine(family, !u64::from(index)), family: Some((family, index)) }
+        Self { key: combine(family, !u64::from(index)), family: Some((family, Place::new(index))) }
     }
 
     /// 64 random bits for a purpose at a depth (vertex number along the subpath).
@@ -108,38 +111,38 @@ impl Sampler {
         combine(self.key, (u64::from(depth) << 8) | purpose as u64)
     }
 
-    /// The key of a purpose in the family, and the place there, where numbers are spread evenly.
+    /// The place in the family and the key of a purpose, where numbers are spread evenly.
     #[inline(always)]
-    fn even(&self, depth: u32, purpose: Purpose) -> Option<(u64, u32)> {
+    fn even(&self, depth: u32, purpose: Purpose) -> Option<(Place, u64)> {
         match self.family {
-            Some((family, index)) if depth <= EVEN_DEPTHS && purpose.is_even() => {
-                Some((combine(family, (u64::from(depth) << 8) | purpose as u64), index))
+            Some((family, place)) if depth <= EVEN_DEPTHS && purpose.is_even() => {
+                Some((place, combine(family, (u64::from(depth) << 8) | purpose as u64)))
             }
             _ => None,
         }
     }
 
-    /// Uniform in [0,1), 53 bits.
+    /// Uniform in [0,1): 53 bits, or the 32 of a number that is spread evenly, which is never 0.
     #[inline(always)]
     pub fn u1(&self, depth: u32, purpose: Purpose) -> f64 {
-        let bits = self.bits(depth, purpose);
         match self.even(depth, purpose) {
-            Some((key, index)) => refined(sobol::point1(index, key), bits),
-            None => unit(bits),
+            Some((place, key)) => fraction(place.point1(key)),
+            None => unit(self.bits(depth, purpose)),
         }
     }
 
-    /// Two independent uniforms in [0,1).
+    /// Two independent uniforms in [0,1), as [`Sampler::u1`] gives one.
     #[inline(always)]
     pub fn u2(&self, depth: u32, purpose: Purpose) -> DVec2 {
-        let a = self.bits(depth, purpose);
-        let b = mix(a ^ 0x6a09_e667_f3bc_c908);
         match self.even(depth, purpose) {
-            Some((key, index)) => {
-                let [x, y] = sobol::point2(index, [key, mix(key ^ 0x3c6e_f372_fe94_f82b)]);
-                DVec2::new(refined(x, a), refined(y, b))
+            Some((place, key)) => {
+                let [x, y] = place.point2(key);
+                DVec2::new(fraction(x), fraction(y))
             }
-            None => DVec2::new(unit(a), unit(b)),
+            None => {
+                let a = self.bits(depth, purpose);
+                DVec2::new(unit(a), unit(mix(a ^ 0x6a09_e667_f3bc_c908)))
+            }
         }
     }
 
@@ -150,10 +153,10 @@ impl Sampler {
     }
 }
 
-/// A fraction of 2^32 with 21 more bits below, as a number in [0,1).
+/// The middle of one of 2^32 parts of [0,1).
 #[inline(always)]
-fn refined(fraction: u32, bits: u64) -> f64 {
-    unit((u64::from(fraction) << 32) | (bits >> 32))
+fn fraction(part: u32) -> f64 {
+    (f64::from(part) + 0.5) * (1.0 / (1u64 << 32) as f64)
 }
 
 /// The top 53 bits as a number in [0,1).

@@ -110,11 +110,11 @@ choice! {
 }
 
 choice! {
-    /// Whether light subpaths are sent where earlier ones proved useful.
-    Guiding, "guiding", guiding {
-        /// By the cosine alone.
+    /// Whether something is done.
+    Switch, "guiding", guiding {
+        /// It is not.
         Off = "off",
-        /// By what a pre-pass found.
+        /// It is.
         On = "on",
     }
 }
@@ -127,7 +127,7 @@ mod tests {
     fn names_are_read_back() {
         assert!(Integrator::ALL.iter().all(|v| v.to_string().parse() == Ok(*v)));
         assert!(Backend::ALL.iter().all(|v| v.to_string().parse() == Ok(*v)));
-        assert!(Guiding::ALL.iter().all(|v| v.to_string().parse() == Ok(*v)));
+        assert!(Switch::ALL.iter().all(|v| v.to_string().parse() == Ok(*v)));
         assert!(Heuristic::ALL.iter().all(|v| v.to_string().parse() == Ok(*v)));
         assert_eq!("lvc+hrr".parse(), Ok(Integrator::LvcHrr));
         assert_eq!("brute".parse(), Ok(Backend::Brute));

@@ -4,7 +4,7 @@
 mod choices;
 mod table;
 
-pub use choices::{Backend, Guiding, Heuristic, Integrator};
+pub use choices::{Backend, Heuristic, Integrator, Switch};
 pub use table::TABLE;
 
 use crate::error::{Error, Place};
@@ -46,7 +46,9 @@ pub struct Settings {
     /// Probability of storing a light vertex whose predecessor does not scatter narrowly, where the roulette plays.
     pub storing: f64,
     /// Whether light subpaths are sent where earlier ones proved useful to the roulette.
-    pub guiding: Guiding,
+    pub guiding: Switch,
+    /// Whether eye samples go to the pixels that need them, where the renderer chooses their number.
+    pub adaptive: Switch,
     /// How techniques that find the same path share its weight.
     pub mis: Heuristic,
     /// Light subpaths that probabilistic connections (`pcbpt`) choose from.
@@ -80,7 +82,8 @@ impl Default for Settings {
             expected: 1.0,
             hrr_alpha: 0.3,
             storing: 0.05,
-            guiding: Guiding::On,
+            guiding: Switch::On,
+            adaptive: Switch::On,
             mis: Heuristic::Balance,
             reused_subpaths: 100,
             record_spacing: 8,

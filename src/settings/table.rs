@@ -1,6 +1,6 @@
 //! One row for every setting.
 
-use super::{Backend, Guiding, Heuristic, Integrator, Kind, Setting};
+use super::{Backend, Heuristic, Integrator, Kind, Setting, Switch};
 
 const TRANSPORT: &str = "Light transport";
 const BUDGET: &str = "Budget and randomness";
@@ -115,10 +115,10 @@ pub const TABLE: &[Setting] = &[
     Setting {
         name: "guiding",
         kind: Kind::Choice {
-            names: &Guiding::NAMES,
+            names: &Switch::NAMES,
             planned: &[],
             get: |s| s.guiding as usize,
-            set: |s, i| s.guiding = Guiding::ALL[i],
+            set: |s, i| s.guiding = Switch::ALL[i],
         },
         default: "on",
         value_name: "NAME",
@@ -126,6 +126,21 @@ pub const TABLE: &[Setting] = &[
         help: "Whether emitters send light (+hrr) where a pre-pass found it useful",
         doc: "on: towards what reaches the image by way of surfaces where the roulette plays; three directions of ten \
               stay as they are without. off: by the cosine alone.",
+    },
+    Setting {
+        name: "adaptive",
+        kind: Kind::Choice {
+            names: &Switch::NAMES,
+            planned: &[],
+            get: |s| s.adaptive as usize,
+            set: |s, i| s.adaptive = Switch::ALL[i],
+        },
+        default: "on",
+        value_name: "NAME",
+        heading: TRANSPORT,
+        help: "Whether noisy pixels get more of the eye samples (--time without --samples)",
+        doc: "on: samples, and the roulette's queries, go where earlier iterations showed that they lower the relative \
+              error most. off: to all pixels alike.",
     },
     Setting {
         name: "mis",

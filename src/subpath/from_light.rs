@@ -1,7 +1,7 @@
 //! Light subpaths.
 
-use super::World;
 use super::walk::{Rules, Start, Walk};
+use super::{Total, World};
 use crate::light::{EmissionGuide, EmitterPoint};
 use crate::sampler::{Purpose, Sampler};
 use crate::visibility::offset;
@@ -30,11 +30,10 @@ pub fn emit(
         direction,
         pdf_w,
         cos,
-        total: [rules.heuristic.raise(m_0 / emitter.pdf_a), 0.0],
+        total: Total::known(rules.heuristic.raise(m_0 / emitter.pdf_a)),
     };
     let throughput = emitter.emission * (cos / (emitter.pdf_a * pdf_w));
-    let narrow = rules.storing.is_narrow(&world.bsdf_of(emitter.point.triangle));
-    Some(Walk { after_narrow: [narrow, false], ..Walk::follow(world, rules, &start, throughput)? })
+    Walk::follow(world, rules, &start, throughput)
 }
 
 /// Where and in which direction a light subpath starts; `None` when nothing emits.

@@ -6,7 +6,7 @@ pub mod vertex;
 pub mod walk;
 pub mod from_light;
 
-pub use storing::Storing;
+pub use storing::{Origin, Role, Storing, Total};
 pub use vertex::{Scattered, Vertex};
 pub use walk::Walk;
 pub use world::World;

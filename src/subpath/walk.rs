@@ -1,6 +1,6 @@
 //! One step of a subpath, the same from either end.
 
-use super::{Scattered, Storing, Vertex, World};
+use super::{Origin, Scattered, Storing, Total, Vertex, World};
 use crate::bsdf::Transport;
 use crate::math::Spectrum;
 use crate::mis::{Heuristic, Side};
@@ -18,14 +18,16 @@ pub struct Walk {
     pub throughput: Spectrum,
     /// Multiple importance sampling's sums.
     pub side: Side,
+    /// The `b` of these if the vertex is taken for the light's own, and not for a surface that is lit.
+    pub b_as_lamp: f64,
     /// Distance to the previous vertex, world units.
     pub distance: f64,
     /// Segments from the subpath's start, at least 1.
     pub depth: u32,
     /// Whether the previous vertex scattered by a delta lobe, so that nothing can connect to it.
     pub after_delta: bool,
-    /// Whether the previous vertex scatters narrowly ([`Storing`]), and the one before it.
-    pub after_narrow: [bool; 2],
+    /// Light side: what threw light on the vertex, and on the one before it.
+    pub origins: [Origin; 2],
 }
 
 /// What all steps of a subpath have in common.
@@ -52,9 +54,8 @@ pub struct Start {
     pub pdf_w: f64,
     /// |cos| at the origin.
     pub cos: f64,
-    /// [`Heuristic::total`] at the origin: what is known, and what counts for the probability that the origin would be
-    /// stored as a light vertex, were the vertex that the segment leads to its predecessor.
-    pub total: [f64; 2],
+    /// [`Heuristic::total`] at the origin.
+    pub total: Total,
 }
 
 impl Walk {
@@ -69,20 +70,22 @@ impl Walk {
         }
         let vertex = Vertex::new(world, point, wo);
         let Rules { heuristic, storing, .. } = rules;
-        let [known, if_stored] = start.total;
-        let total = if if_stored == 0.0 {
-            known
-        } else {
-            known + heuristic.raise(storing.probability(storing.is_narrow(&vertex.bsdf))) * if_stored
-        };
+        let total = start.total.given(*heuristic, storing, storing.origin(&vertex.bsdf));
+        let side = heuristic.arrive(start.pdf_w, cos, start.cos, distance2, total);
+        let as_lamp = start.total.given(*heuristic, storing, Origin::Lamp);
         Some(Self {
             vertex,
             throughput,
-            side: heuristic.arrive(start.pdf_w, cos, start.cos, distance2, total),
+            side,
+            b_as_lamp: if as_lamp == total {
+                side.b
+            } else {
+                heuristic.arrive(start.pdf_w, cos, start.cos, distance2, as_lamp).b
+            },
             distance: distance2.sqrt(),
             depth: 1,
             after_delta: false,
-            after_narrow: [false; 2],
+            origins: [Origin::Lamp; 2],
         })
     }
 
@@ -92,7 +95,7 @@ impl Walk {
         world: &World<'_>,
         rules: &Rules,
         sampler: &Sampler,
-        total: impl FnOnce(&Scattered) -> [f64; 2],
+        total: impl FnOnce(&Scattered) -> Total,
     ) -> Option<Self> {
         let s = self.vertex.sample(rules.transport, sampler, self.depth)?;
         let start = Start {
@@ -106,7 +109,7 @@ impl Walk {
         Some(Self {
             depth: self.depth + 1,
             after_delta: s.delta,
-            after_narrow: [rules.storing.is_narrow(&self.vertex.bsdf), self.after_narrow[0]],
+            origins: [rules.storing.origin(&self.vertex.bsdf), self.origins[0]],
             ..Self::follow(world, rules, &start, self.throughput * s.weight)?
         })
     }

@@ -4,7 +4,10 @@ use std::fs;
 use std::path::Path;
 
 /// In the order in which a host meets them.
-const FILES: [&str; 8] = ["status", "context", "segment", "cache", "lobe", "query", "batch", "aids"];
+const FILES: [&str; 17] = [
+    "status", "log", "memory", "progress", "context", "segment", "cache", "lobe", "query", "batch", "aids",
+    "replay", "capture", "geometry", "rays", "scene", "render",
+];
 
 const HEAD: &str = "/* hrr.h - the C interface of libhrr: hierarchical Russian roulette for vertex connections.
  *
@@ -76,5 +79,5 @@ fn header_declares_every_function() {
             }
         }
     }
-    assert!(count > 20);
+    assert!(count > 50);
 }

@@ -59,7 +59,12 @@ fn static_needs(command: &mut Command) {
     command.args(["-lpthread", "-ldl", "-lm", "-lgcc_s", "-lc"]);
 }
 
-fn compile_and_run(mut compiler: Command, source: &str, shared: bool) {
+fn compile_and_run(compiler: Command, source: &str, shared: bool) {
+    compile_and_run_with(compiler, source, shared, &[]);
+}
+
+/// `DIRECTORY` among the arguments stands for one that is there for the time of the run.
+fn compile_and_run_with(mut compiler: Command, source: &str, shared: bool, arguments: &[&str]) -> String {
     let directory = tempfile::tempdir().unwrap();
     let program = directory.path().join("program");
     compiler.arg(root().join("examples/c").join(source)).arg("-o").arg(&program);
@@ -71,11 +76,15 @@ fn compile_and_run(mut compiler: Command, source: &str, shared: bool) {
     }
     run(&mut compiler);
     let mut program = Command::new(program);
+    for argument in arguments {
+        program.arg(if *argument == "DIRECTORY" { directory.path().as_os_str() } else { argument.as_ref() });
+    }
     if shared {
         program.env("LD_LIBRARY_PATH", libraries());
     }
     let text = run(&mut program);
     assert!(text.ends_with("all is well\n"), "{text}");
+    text
 }
 
 #[test]
@@ -88,6 +97,66 @@ fn headers_compile_alone() {
         for standard in ["c++11", "c++17"] {
             run(cpp(standard).args(["-fsyntax-only", "-x", "c++"]).arg(&header));
         }
+    }
+}
+
+#[test]
+fn headers_compile_with_clang() {
+    if Command::new("clang").arg("--version").output().is_err() {
+        eprintln!("skipped: there is no clang");
+        return;
+    }
+    for (header, language, standard) in [
+        ("hrr.h", "c", "c99"),
+        ("hrr.h", "c++", "c++11"),
+        ("hrr.hpp", "c++", "c++11"),
+        ("hrr.hpp", "c++", "c++17"),
+    ] {
+        let mut clang = Command::new("clang");
+        clang.args(STRICT).arg(format!("-std={standard}")).args(["-fsyntax-only", "-x", language]);
+        run(clang.arg(root().join("include").join(header)));
+    }
+}
+
+#[test]
+fn a_host_with_threads_of_its_own() {
+    for (standard, shared) in [("c++11", true), ("c++17", false)] {
+        compile_and_run_with(cpp(standard), "threads.cpp", shared, &["DIRECTORY"]);
+    }
+}
+
+#[test]
+fn a_host_with_a_path_tracer_of_its_own() {
+    let mut compiler = cpp("c++17");
+    compiler.arg("-O2");
+    let text = compile_and_run_with(compiler, "connect.cpp", true, &["64", "12", "DIRECTORY"]);
+    let ratio = text.split("variance without / with ").nth(1).unwrap().lines().next().unwrap();
+    assert!(ratio.parse::<f64>().unwrap() > 3.0, "{text}");
+    compile_and_run_with(cpp("c++17"), "connect.cpp", false, &["16", "2"]);
+}
+
+#[cfg(feature = "embree")]
+#[test]
+fn a_host_with_an_embree_scene_of_its_own() {
+    let mut compiler = cpp("c++17");
+    if let Some(directory) = std::env::var_os("EMBREE4_ROOT") {
+        // As the system's headers: their warnings are theirs.
+        compiler.arg("-isystem").arg(Path::new(&directory).join("include"));
+        let library = Path::new(&directory).join("lib");
+        compiler.arg("-L").arg(&library).arg(format!("-Wl,-rpath,{}", library.display()));
+    }
+    compiler.arg("-Wl,--no-as-needed").arg("-lembree4");
+    compile_and_run(compiler, "embree_host.cpp", true);
+}
+
+#[test]
+fn every_function_with_good_and_bad_arguments() {
+    for shared in [true, false] {
+        let mut compiler = c();
+        compiler.arg("-D_POSIX_C_SOURCE=200809L");
+        let scene = root().join("scenes/cornell/scene.toml");
+        let scene = scene.to_str().unwrap();
+        compile_and_run_with(compiler, "../../tests/ffi/every_function.c", shared, &["DIRECTORY", scene]);
     }
 }
 

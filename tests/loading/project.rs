@@ -22,9 +22,13 @@ fn the_scenes_are_what_their_generator_makes() {
 #[test]
 fn the_scenes_load_without_a_warning() {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes");
-    for (name, triangles) in
-        [("cornell", 36), ("caustic_mirror", 5530), ("caustic_mirror_aniso", 5530), ("glass_caustic", 20214)]
-    {
+    for (name, triangles) in [
+        ("cornell", 36),
+        ("caustic_mirror", 5530),
+        ("caustic_mirror_aniso", 5530),
+        ("glass_caustic", 20214),
+        ("mirror_room", 13056),
+    ] {
         let scene = Scene::load(&folder.join(name).join("scene.toml"), &[]).unwrap();
         assert_eq!(scene.warnings, [""; 0], "{name}");
         assert_eq!(scene.mesh.triangles.len(), triangles, "{name}");
@@ -47,6 +51,7 @@ fn the_mirrors_are_as_glossy_as_they_say() {
         ("caustic_mirror", [1e-4, 1e-4]),
         ("caustic_mirror_aniso", [1e-4, 1e-2]),
         ("glass_caustic", [1e-4, 1e-4]),
+        ("mirror_room", [1e-4, 1e-4]),
     ] {
         for file in ["scene.toml", "scene.obj"] {
             let scene = Scene::load(&folder.join(name).join(file), &[]).unwrap();

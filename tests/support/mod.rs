@@ -9,6 +9,7 @@ pub mod distribution;
 pub mod estimate;
 pub mod program;
 pub mod quadrature;
+pub mod calls_of_bytes;
 pub mod query_of_bytes;
 pub mod scenes;
 pub mod shapes;

@@ -16,7 +16,7 @@ use hrr::report::page::{Pictures, page, sentences};
 use hrr::report::results::Results;
 use hrr::report::study::{self, Contender, Reference, deviation_map};
 use hrr::scene::Scene;
-use hrr::settings::{Guiding, Heuristic, Integrator, Settings};
+use hrr::settings::{Heuristic, Integrator, Settings, Switch};
 use hrr::{Error, Result, file};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -270,7 +270,7 @@ fn contenders(scene: &Scene, settings: &Settings, quick: bool) -> Vec<Contender>
         for expected in [0.1, 10.0, 100.0] {
             add(format!("expected {expected}"), knob(&|s| s.expected = expected));
         }
-        add("guiding off".into(), knob(&|s| s.guiding = Guiding::Off));
+        add("guiding off".into(), knob(&|s| s.guiding = Switch::Off));
         add("all stored".into(), knob(&|s| s.storing = 1.0));
         add("hrr_alpha 0.05".into(), knob(&|s| s.hrr_alpha = 0.05));
     }

@@ -96,7 +96,7 @@ impl MinimumRandom {
         let u = fine_unit(mix(key ^ ROOT));
         match self {
             Self::Nested | Self::SemiStratified => Minimum { xi: u / leaves, base: 1.0 / leaves },
-            Self::Exact => Minimum { xi: exact_minimum(u, leaves), base: 0.0 },
+            Self::Exact => Minimum { xi: exact_minimum((-u).ln_1p(), leaves), base: 0.0 },
         }
     }
 
@@ -132,17 +132,20 @@ impl MinimumRandom {
                 let part = (1.0 - parent.base) / count;
                 Minimum { xi: parent.base + u * part, base: parent.base + part }
             }
+            // Draws of 53 bits or fewer, as here, subtract exactly.
             Self::Exact => {
-                Minimum { xi: parent.xi + (1.0 - parent.xi) * exact_minimum(1.0 - u, count), base: 0.0 }
+                let least = exact_minimum((1.0 - u).ln(), count);
+                Minimum { xi: parent.xi + (1.0 - parent.xi) * least, base: 0.0 }
             }
         }
     }
 }
 
-/// Minimum of `count` uniforms from one `v` in (0,1], `1 - v^(1/count)` without its cancellation.
+/// Minimum of `count` uniforms from one u in [0,1], `1 - (1 - u)^(1/count)` without its cancellations; `ln` is
+/// ln(1 - u), through `ln_1p` where u has digits far below 1.
 #[inline(always)]
-fn exact_minimum(v: f64, count: f64) -> f64 {
-    -(v.ln() / count).exp_m1()
+fn exact_minimum(ln: f64, count: f64) -> f64 {
+    -(ln / count).exp_m1()
 }
 
 /// How the walk deals numbers to eight children of equal size.
@@ -167,13 +170,22 @@ pub(super) trait Deal: Copy {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::vertex_bvh::VertexBvh;
 
     #[test]
     fn exact_minimum_has_no_cancellation() {
         // u / n to first order; the naive 1 - (1 - u)^(1/n) has nothing but zeros here.
         let n = 2f64.powi(50);
-        let v = 1.0 - 2f64.powi(-20);
-        assert!((exact_minimum(v, n) * n * 2f64.powi(20) - 1.0).abs() < 1e-6);
+        for u in [2f64.powi(-20), 1e-16, 1e-25, 2f64.powi(-128)] {
+            assert!((exact_minimum((-u).ln_1p(), n) * n / u - 1.0).abs() < 1e-6, "{u:e}");
+        }
+        assert_eq!(exact_minimum(0.0, n), 0.0);
+        assert_eq!(MinimumRandom::Exact.sibling(Minimum { xi: 0.0, base: 0.0 }, 0.5, 8.0, 1.0).xi, 0.5);
+        // Of all keys, the one with the least draw: below 2^-64, where 1 - u is 1.
+        let key = ROOT;
+        assert_eq!(mix(key ^ ROOT), 0);
+        let least = MinimumRandom::Exact.root(key, 2f64.powi(20)).xi;
+        assert!(least > 0.0 && least < 2f64.powi(-80), "{least:e}");
     }
 
     #[test]
@@ -240,6 +252,87 @@ mod tests {
         check(|key| Nested { key });
         check(|key| SemiStratified { key });
         check(|key| Exact { key });
+    }
+
+    /// As [`leaves`], but only the leaves whose number is below a threshold, found as the walk finds them: their
+    /// numbers over the threshold, and their places.
+    fn tail<D: Deal>(deal: D, node: NodeId, number: D::Number, below: f64, out: &mut Vec<(f64, usize)>) {
+        let (mut children, mut least) = ([number; WIDTH], [0.0; WIDTH]);
+        fearless_simd::dispatch!(fearless_simd::Level::new(), simd => {
+            let eight = deal.eight(simd, number, node);
+            D::push(simd, &mut children, &eight, 0xff);
+            D::bounds(simd, &eight).store_slice(&mut least);
+            if node.level == 0 {
+                let place = |lane| node.index as usize * WIDTH + lane;
+                let leaf = |lane| (deal.leaf(&eight, node, lane) / below, place(lane));
+                out.extend((0..WIDTH).map(leaf).filter(|leaf| leaf.0 < 1.0));
+            }
+        });
+        for lane in (0..WIDTH).filter(|&lane| node.level > 0 && f64::from(least[lane]) <= below * 1.000_001) {
+            tail(deal, node.child(lane as u32), children[lane], below, out);
+        }
+    }
+
+    #[test]
+    fn tails_are_uniform_down_to_1e_minus_11() {
+        fn check<D: Deal>(deal: impl Fn(u64) -> D) {
+            for (level, below, keys) in
+                [(2, 1e-3, 8000), (4, 1e-5, 12_000), (6, 1e-7, 20_000), (9, 1e-11, 300_000)]
+            {
+                let (root, capacity) = (NodeId { level, index: 0 }, VertexBvh::capacity(level));
+                let mut out = Vec::new();
+                for key in 0..keys {
+                    let deal = deal(mix(key ^ 0x7a11));
+                    let number = deal.root(capacity);
+                    tail(deal, root, number, below, &mut out);
+                }
+                // As many as there should be, in all places alike, uniform below the threshold.
+                let (n, mean) = (out.len() as f64, capacity * below * keys as f64);
+                assert!(
+                    (n - mean).abs() < 4.5 * mean.sqrt() && n > 2000.0,
+                    "below {below:e}: {n} for {mean}"
+                );
+                for digit in 0..=level {
+                    let mut lanes = [0.0; WIDTH];
+                    out.iter().for_each(|leaf| lanes[leaf.1 >> (3 * digit) & 7] += 1.0);
+                    let chi2: f64 = lanes.iter().map(|l| (l - n / 8.0).powi(2) / (n / 8.0)).sum();
+                    assert!(chi2 < 36.0, "below {below:e}, level {digit}: chi^2 {chi2} of 7"); // p = 7e-6
+                }
+                out.sort_unstable_by(|a, b| a.0.total_cmp(&b.0));
+                let gap = |(i, x): (usize, &(f64, usize))| (x.0 - (i as f64 + 0.5) / n).abs();
+                let d = out.iter().enumerate().map(gap).fold(0.0, f64::max) * n.sqrt();
+                assert!(d < 2.3, "below {below:e}: sqrt(n) D = {d}"); // p = 5e-5
+            }
+        }
+        check(|key| Nested { key });
+        check(|key| SemiStratified { key });
+        check(|key| Exact { key });
+    }
+
+    #[test]
+    #[ignore = "ten seconds: 1e8 numbers for each rule"]
+    fn the_perfect_tree_deals_uniform_leaves_over_1e8_draws() {
+        const BINS: usize = 1 << 16;
+        fn check<D: Deal>(name: &str, deal: impl Fn(u64) -> D) {
+            let (node, mut out, mut bins) = (NodeId { level: 3, index: 0 }, Vec::new(), vec![0u64; BINS]);
+            let trees = 100_000_000 / 4096 + 1;
+            for key in 0..trees {
+                let deal = deal(mix(key ^ 0x1e8));
+                out.clear();
+                leaves(deal, node, deal.root(4096.0), &mut out);
+                out.iter().for_each(|x| bins[((x * BINS as f64) as usize).min(BINS - 1)] += 1);
+            }
+            let (n, mut below, mut gap) = ((trees * 4096) as f64, 0.0, 0.0f64);
+            for (bin, &count) in bins.iter().enumerate() {
+                below += count as f64;
+                gap = gap.max((below / n - (bin + 1) as f64 / BINS as f64).abs());
+            }
+            println!("{name}: sqrt(n) D = {:.3} over {n:.0}", gap * n.sqrt());
+            assert!(gap * n.sqrt() < 2.3);
+        }
+        check("nested", |key| Nested { key });
+        check("semi-stratified", |key| SemiStratified { key });
+        check("exact", |key| Exact { key });
     }
 
     #[test]
