@@ -2,6 +2,7 @@
 
 use super::bootstrap::Interval;
 use super::results::{Results, Row};
+use crate::math::relative::median;
 
 /// Rungs that the longest is predicted from.
 const FITTED: usize = 4;
@@ -11,7 +12,7 @@ const FITTED: usize = 4;
 pub struct Rung {
     /// Iterations.
     pub iterations: u64,
-    /// Mean wall-clock seconds.
+    /// Median wall-clock seconds.
     pub seconds: f64,
     /// Error: the root of the mean of the runs' squares.
     pub error: Interval,
@@ -84,10 +85,15 @@ impl<'a> Table<'a> {
         runs.iter().map(|&r| value(self.rungs[rung].1[r])).sum::<f64>() / runs.len() as f64
     }
 
+    /// The median run's seconds: a run that another program held up does not count.
+    fn seconds(&self, rung: usize, runs: &[usize]) -> f64 {
+        median(&mut runs.iter().map(|&r| self.rungs[rung].1[r].seconds).collect::<Vec<_>>())
+    }
+
     /// Variance of the error times seconds, at the longest rung.
     fn unit(&self, runs: &[usize]) -> f64 {
         let last = self.rungs.len() - 1;
-        self.mean(last, runs, |r| r.square).max(0.0) * self.mean(last, runs, |r| r.seconds)
+        self.mean(last, runs, |r| r.square).max(0.0) * self.seconds(last, runs)
     }
 
     /// The line through the rungs below the longest, at most [`FITTED`]: intercept and slope of the logarithm of the
@@ -124,7 +130,7 @@ fn curve(name: &str, table: &Table<'_>, first: &Table<'_>) -> Curve {
     let rungs: Vec<Rung> = (0..table.rungs.len())
         .map(|k| Rung {
             iterations: table.rungs[k].0,
-            seconds: table.mean(k, &all, |r| r.seconds),
+            seconds: table.seconds(k, &all),
             error: Interval::new(n, |runs| table.mean(k, runs, |r| r.square).max(0.0).sqrt()),
         })
         .collect();
@@ -158,7 +164,7 @@ fn predict(table: &Table<'_>, rungs: &[Rung]) -> Prediction {
         ((intercept + slope * iterations.ln()).exp() * chance).max(0.0).sqrt()
     });
     let measured = rungs[last].error.value;
-    let setup = table.mean(below, &all, |r| r.setup);
+    let setup = median(&mut table.rungs[below].1.iter().map(|r| r.setup).collect::<Vec<_>>());
     let per_iteration = (rungs[below].seconds - setup) / rungs[below].iterations as f64;
     let (intercept, slope) = table.fit(&all);
     let needed = ((2.0 * measured.max(f64::MIN_POSITIVE).ln() - intercept) / slope).exp();
