@@ -90,6 +90,11 @@ impl Film {
         self.samples
     }
 
+    /// What the samples of a pixel count for so far: their number, unless [`Film::set_weight`] was called.
+    pub fn weights(&self) -> u64 {
+        self.weights
+    }
+
     /// Values that were not finite and therefore left out. Always 0 unless hrr has a bug.
     pub fn dropped(&self) -> u64 {
         self.dropped.load(Ordering::Relaxed)
@@ -189,6 +194,12 @@ impl Film {
         self.weights += other.weights;
         *self.dropped.get_mut() += other.dropped();
         Ok(())
+    }
+
+    /// The sums of a row of pixels, in double precision.
+    pub fn row(&self, y: u32) -> Vec<Spectrum> {
+        let row = self.rows[y as usize].lock().unwrap_or_else(|poisoned| poisoned.into_inner());
+        row.iter().map(|sums| Spectrum::from_array(sums.map(|v| v as f64 / ONE))).collect()
     }
 
     /// The mean of a pixel, in double precision.

@@ -34,6 +34,7 @@ pub mod connect;
 
 pub mod integrator;
 pub mod render;
+pub mod report;
 
 pub mod ffi;
 

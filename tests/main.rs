@@ -22,4 +22,7 @@ mod determinism;
 mod effects;
 mod layers;
 mod mis;
+mod flip;
+mod report;
+mod study;
 mod ffi;

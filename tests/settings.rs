@@ -26,6 +26,7 @@ fn other_value(name: &str) -> &'static str {
         "memory" => "3.5",
         "adaptive" => "off",
         "time" => "30.5",
+        "error" => "0.25",
         "first_iteration" => "64",
         "seed" => "9223372036854775807",
         "visibility" => "brute",
@@ -54,6 +55,7 @@ fn every_field_has_its_row() {
         iterations,
         first_iteration,
         time,
+        error,
         memory,
         seed,
         threads,
@@ -75,10 +77,11 @@ fn every_field_has_its_row() {
     assert_eq!((integrator, visibility), (Integrator::LvcHrr, Backend::Brute));
     assert_eq!((max_depth, samples, light_subpaths, connections), (7, 2, 1234, 3));
     assert_eq!((iterations, first_iteration, time, seed), (9, 64, Some(30.5), i64::MAX as u64));
+    assert_eq!(error, Some(0.25));
     assert_eq!((threads, memory, expected, hrr_alpha, mis), (2, 3.5, 0.25, 0.125, Heuristic::Power));
     assert_eq!((merge_radius, merge_pixels, merge_shrink), (0.5, 5.0, 1.0));
     assert_eq!((reused_subpaths, record_spacing), (50, 4));
-    assert_eq!((storing, guiding, adaptive, TABLE.len()), (0.5, Switch::Off, Switch::Off, 25));
+    assert_eq!((storing, guiding, adaptive, TABLE.len()), (0.5, Switch::Off, Switch::Off, 26));
     assert_eq!((with.to_string(), without.to_string()), ("sds".into(), "caustics,lens".into()));
 }
 

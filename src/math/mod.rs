@@ -6,6 +6,7 @@
 pub mod aabb;
 pub mod discrete;
 pub mod frame;
+pub mod relative;
 pub mod spectrum;
 pub mod warp;
 

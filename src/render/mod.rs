@@ -1,10 +1,12 @@
 //! A whole render: iterations until their number, the time or the observer says enough.
 
 pub mod counters;
+pub mod noise;
 pub mod observer;
 mod sizing;
 
 pub use counters::{Counters, Memory, Seconds, Stats};
+pub use noise::{ErrorEstimate, Noise};
 pub use observer::{Observer, Progress, Silent};
 
 use crate::effects;
@@ -12,7 +14,7 @@ use crate::error::{Error, Result};
 use crate::film::Film;
 use crate::integrator::{self, Plan, Size};
 use crate::scene::Scene;
-use crate::settings::{Settings, Switch};
+use crate::settings::{Integrator, Settings, Switch};
 use crate::subpath::World;
 use crate::tally::Tally;
 use sizing::{Measured, Sizing};
@@ -26,6 +28,8 @@ pub struct Outcome {
     pub film: Film,
     /// What was done and what it cost. `seconds.load` and `seconds.total` are for the caller to fill in.
     pub stats: Stats,
+    /// What the iterations' scatter tells of the error.
+    pub noise: Noise,
     /// Sizes that were chosen for iterations, with what each counts for; empty where the settings say them.
     pub sizes: Vec<(Size, u32)>,
     /// What was switched on, and what is missing from the image.
@@ -75,13 +79,19 @@ fn run(scene: &Scene, settings: &Settings, observer: &dyn Observer) -> Result<Ou
     let mut bytes = (0, 0);
 
     let start = Instant::now();
-    let iterations = settings.time.is_none().then_some(settings.iterations);
+    let open_ended = settings.time.is_some() || settings.error.is_some();
+    let iterations = (!open_ended).then_some(settings.iterations);
+    let mut noise = Noise::new(film.width(), film.height());
     let accepted = AtomicU64::new(0);
     let mut finished = 0;
     let mut interrupted = false;
     loop {
         let elapsed = start.elapsed().as_secs_f64();
         if iterations.is_some_and(|n| finished >= n) || settings.time.is_some_and(|t| elapsed >= t) {
+            break;
+        }
+        let error = noise.error().map(|e| e.bound);
+        if error.zip(settings.error).is_some_and(|(error, target)| error <= target) {
             break;
         }
         if observer.should_stop() {
@@ -95,6 +105,8 @@ fn run(scene: &Scene, settings: &Settings, observer: &dyn Observer) -> Result<Ou
                 fraction,
                 elapsed: start.elapsed().as_secs_f64(),
                 time_limit: settings.time,
+                error,
+                target: settings.error,
                 accepted: accepted.load(Ordering::Relaxed),
             });
         };
@@ -102,6 +114,7 @@ fn run(scene: &Scene, settings: &Settings, observer: &dyn Observer) -> Result<Ou
         let done = integrator.iterate(settings.first_iteration + finished, &mut film, &progress)?;
         tally.add(&done);
         finished += 1;
+        noise.update(&film, finished, false);
         accepted.store(tally.roulette.accepted, Ordering::Relaxed);
         let (cache, tree) = integrator.bytes();
         bytes = (bytes.0.max(cache), bytes.1.max(tree));
@@ -114,6 +127,7 @@ fn run(scene: &Scene, settings: &Settings, observer: &dyn Observer) -> Result<Ou
             sizes.push((size, weight));
         }
     }
+    noise.update(&film, finished, true);
     let render = start.elapsed().as_secs_f64();
     if film.dropped() > 0 {
         observer.warn(&format!(
@@ -165,5 +179,13 @@ fn run(scene: &Scene, settings: &Settings, observer: &dyn Observer) -> Result<Ou
         },
     };
     sizes.truncate(usize::try_from(finished).unwrap_or(usize::MAX));
-    Ok(Outcome { film, stats, sizes, plan, interrupted })
+    Ok(Outcome { film, stats, noise, sizes, plan, interrupted })
+}
+
+/// The integrator that is set, or what `auto` stands for: the least machinery that finds all of the scene's light.
+///
+/// # Errors
+/// As [`render`], where no integrator finds all of it.
+pub fn chosen(scene: &Scene, settings: &Settings) -> Result<Integrator> {
+    Ok(integrator::plan::plan(scene, settings, &effects::analyze(scene, settings))?.integrator)
 }

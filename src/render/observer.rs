@@ -13,6 +13,10 @@ pub struct Progress {
     pub elapsed: f64,
     /// Seconds after which no iteration is begun; `None` when their number decides.
     pub time_limit: Option<f64>,
+    /// What the relative error is below of, with 90 % confidence; `None` before it can be told.
+    pub error: Option<f64>,
+    /// The error that ends the render.
+    pub target: Option<f64>,
     /// Connections that the roulette or the uniform picks accepted so far.
     pub accepted: u64,
 }
@@ -23,15 +27,24 @@ impl Progress {
         let by_iterations =
             self.iterations.map(|n| (self.iteration as f64 + self.fraction) / n.max(1) as f64);
         let by_time = self.time_limit.map(|limit| self.elapsed / limit.max(1e-9));
-        by_iterations.unwrap_or(0.0).max(by_time.unwrap_or(0.0)).clamp(0.0, 1.0)
+        let parts = [by_iterations, by_time, self.by_error()];
+        parts.into_iter().flatten().fold(0.0, f64::max).clamp(0.0, 1.0)
+    }
+
+    /// How much of the way to the wanted error is done: noise falls with the root of time.
+    fn by_error(&self) -> Option<f64> {
+        self.error.zip(self.target).map(|(error, target)| (target / error.max(1e-300)).powi(2).min(1.0))
     }
 
     /// Seconds that the rest will take if it goes on like this; `None` before anything can be said.
     pub fn remaining(&self) -> Option<f64> {
-        match (self.iterations, self.time_limit) {
-            (None, Some(limit)) => Some((limit - self.elapsed).max(0.0)),
-            _ if self.elapsed > 0.0 && self.done() > 0.0 => Some(self.elapsed * (1.0 / self.done() - 1.0)),
-            _ => None,
+        let until_limit = self.time_limit.map(|limit| (limit - self.elapsed).max(0.0));
+        let after = |done: f64| (self.elapsed > 0.0 && done > 0.0).then(|| self.elapsed * (1.0 / done - 1.0));
+        match (self.iterations, until_limit, self.by_error().and_then(after)) {
+            (None, Some(limit), Some(error)) => Some(limit.min(error)),
+            (None, Some(limit), None) => Some(limit),
+            (None, None, error) => error,
+            _ => after(self.done()),
         }
     }
 }
@@ -85,6 +98,17 @@ mod tests {
         assert_eq!((p.done(), p.remaining()), (0.75, Some(2.0)));
         let late = Progress { elapsed: 9.0, ..p };
         assert_eq!((late.done(), late.remaining()), (1.0, Some(0.0)));
+    }
+
+    /// Twice the wanted error after 2 s: four times that in all, unless time is up before.
+    #[test]
+    fn the_error_tells_what_is_left() {
+        let p = Progress { elapsed: 2.0, error: Some(0.02), target: Some(0.01), ..Progress::default() };
+        assert_eq!((p.done(), p.remaining()), (0.25, Some(6.0)));
+        let limited = Progress { time_limit: Some(4.0), ..p };
+        assert_eq!((limited.done(), limited.remaining()), (0.5, Some(2.0)));
+        let early = Progress { error: None, ..p };
+        assert_eq!((early.done(), early.remaining()), (0.0, None));
     }
 
     #[test]

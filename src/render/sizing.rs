@@ -62,6 +62,9 @@ impl Sizing {
     /// `None` when the settings say it all: sizes, or a number of iterations.
     pub(super) fn new(settings: &Settings, film: &FilmSettings) -> Option<Self> {
         let time = settings.time?;
+        if settings.error.is_some() {
+            return None; // the error is told from how iterations of one kind differ
+        }
         let recipe = Recipe::of(settings.integrator);
         if recipe.is_some_and(|r| r.merging) {
             return None; // its radius shrinks from iteration to iteration: it needs many

@@ -32,6 +32,9 @@ pub struct Settings {
     pub first_iteration: u64,
     /// Seconds of rendering instead of a number of iterations.
     pub time: Option<f64>,
+    /// Relative error to reach, with 90 % confidence, instead of a number of iterations; see
+    /// [`ErrorEstimate`](crate::render::ErrorEstimate).
+    pub error: Option<f64>,
     /// Seed of all random numbers.
     pub seed: u64,
     /// Threads; 0 = all.
@@ -78,6 +81,7 @@ impl Default for Settings {
             memory: 0.0,
             first_iteration: 0,
             time: None,
+            error: None,
             seed: 0,
             threads: 0,
             samples: 0,

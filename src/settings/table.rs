@@ -6,7 +6,7 @@ const TRANSPORT: &str = "Light transport";
 const BUDGET: &str = "Budget and randomness";
 const MACHINE: &str = "Machine";
 
-/// All settings. Of `iterations` and `time`, the one that is set last is in force.
+/// All settings. `iterations` takes `time` and `error` out of force, and these it.
 pub const TABLE: &[Setting] = &[
     Setting {
         name: "integrator",
@@ -254,7 +254,7 @@ pub const TABLE: &[Setting] = &[
             get: |s| s.iterations,
             set: |s, v| {
                 s.iterations = v;
-                s.time = None;
+                (s.time, s.error) = (None, None);
             },
         },
         default: "64",
@@ -271,6 +271,18 @@ pub const TABLE: &[Setting] = &[
         heading: BUDGET,
         help: "Seconds of rendering, instead of a number of iterations",
         doc: "The iteration that is under way when the time is up is finished.",
+    },
+    Setting {
+        name: "error",
+        kind: Kind::Real { min: 1e-6, max: 1e3, get: |s| s.error, set: |s, v| s.error = Some(v) },
+        default: "",
+        value_name: "ERROR",
+        heading: BUDGET,
+        help: "Relative error to reach, instead of a number of iterations",
+        doc: "Of all pixels but the worst thousandth, the root of the mean of d^2 / (t^2 + eps^2): d a pixel's error, t the \
+              mean luminance of the 16 x 16 pixels around it, eps a hundredth of the image's. It is told from how the \
+              iterations differ, and the render stops when it is below ERROR with 90 % confidence, or when --time is up. \
+              It tells noise: neither the blur of vertex merging nor light that no iteration has found yet.",
     },
     Setting {
         name: "memory",

@@ -67,6 +67,11 @@ impl Bvh4 {
         node
     }
 
+    /// Bytes of all nodes.
+    pub(super) fn bytes(&self) -> usize {
+        size_of_val(&self.nodes[..])
+    }
+
     /// Visits the leaves that a ray may reach, near ones first. `test` looks at primitives `first..first + count` and
     /// returns the distance beyond which nothing matters any more; one below `ray.t_min` ends the search.
     #[inline]

@@ -16,6 +16,7 @@ use crate::geometry::Mesh;
 use embree4_sys as sys;
 use glam::{Vec3, Vec4};
 use std::ffi::{CString, c_void};
+use std::sync::atomic::{AtomicI64, Ordering};
 use std::{mem, ptr};
 
 /// A committed Embree scene of one triangle mesh.
@@ -27,6 +28,8 @@ pub struct Embree {
     // Released before the triangles that it refers to.
     scene: Scene,
     triangles: Box<Triangles>,
+    /// Bytes that Embree holds; it counts them itself, until its scene is released.
+    bytes: Box<AtomicI64>,
 }
 
 /// What Embree reads, and what its answers are checked with.
@@ -69,7 +72,15 @@ impl Embree {
         positions.extend(mesh.positions.iter().map(|&p| p * scale));
         positions.push(Vec3::ZERO);
         let triangles = Box::new(Triangles { positions, corners: mesh.triangles.clone(), cutouts });
+        // Before the device, so that it outlives it on the way out of an error, too.
+        let bytes = Box::new(AtomicI64::new(0));
         let device = Device::new(threads)?;
+        let counter: *const AtomicI64 = &*bytes;
+        // SAFETY: the device is live; the counter outlives it, since `Embree` drops it after the scene, which holds the
+        // last reference to the device.
+        unsafe {
+            sys::rtcSetDeviceMemoryMonitorFunction(device.0, Some(count_bytes), counter.cast_mut().cast());
+        }
         let scene = Scene::new(&device)?;
         if !triangles.corners.is_empty() {
             let geometry = Geometry::new(&device, &triangles)?;
@@ -81,7 +92,7 @@ impl Embree {
         unsafe { sys::rtcCommitScene(scene.0) };
         // A failed commit leaves an empty scene behind and says so nowhere else.
         device.check("building the acceleration structure")?;
-        Ok(Self { scale, inverse_scale: 1.0 / scale, scene, triangles })
+        Ok(Self { scale, inverse_scale: 1.0 / scale, scene, triangles, bytes })
     }
 
     /// A ray as Embree gets it, and what its distances are multiplied with to be the given one's.
@@ -196,6 +207,22 @@ impl Visibility for Embree {
         // A hit is told by a distance of -inf.
         query.t_max < 0.0
     }
+
+    fn bytes(&self) -> Option<u64> {
+        let own = size_of_val(&self.triangles.positions[..]) + size_of_val(&self.triangles.corners[..]);
+        Some(self.bytes.load(Ordering::Relaxed).max(0) as u64 + own as u64)
+    }
+}
+
+/// Embree's news that it takes memory, or gives some back.
+///
+/// # Safety
+/// To be called by Embree only, for a device whose monitor was set with a live [`AtomicI64`].
+unsafe extern "C" fn count_bytes(counter: *mut c_void, bytes: isize, _: bool) -> bool {
+    // SAFETY: set by `Embree::new` to what outlives the device; only ever shared.
+    let counter = unsafe { &*counter.cast_const().cast::<AtomicI64>() };
+    counter.fetch_add(bytes as i64, Ordering::Relaxed);
+    true
 }
 
 impl Triangles {

@@ -49,6 +49,10 @@ pub trait Visibility: Send + Sync {
     fn intersect(&self, ray: &Ray) -> Option<Hit>;
     /// Whether anything is hit at all.
     fn occluded(&self, ray: &Ray) -> bool;
+    /// Bytes that the structure holds; `None` when unknown.
+    fn bytes(&self) -> Option<u64> {
+        None
+    }
 }
 
 /// Builds a backend's structure over a mesh with up to `threads` threads (0: all). The mesh is copied.

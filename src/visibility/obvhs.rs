@@ -66,6 +66,10 @@ impl Obvhs {
 }
 
 impl Visibility for Obvhs {
+    fn bytes(&self) -> Option<u64> {
+        Some((self.tree.bytes() + size_of_val(&self.triangles[..])) as u64)
+    }
+
     fn intersect(&self, ray: &Ray) -> Option<Hit> {
         let shear = Shear::new(ray);
         let mut nearest = None;

@@ -7,6 +7,7 @@
 pub mod chart;
 pub mod distribution;
 pub mod estimate;
+pub mod program;
 pub mod quadrature;
 pub mod calls_of_bytes;
 pub mod query_of_bytes;

@@ -1,7 +1,9 @@
 //! `hrr effects`: what a scene calls for, why, and what that switches on.
 
-use crate::args::{EffectsArgs, Format};
-use crate::log::Log;
+use crate::args::{EXIT_CODES, message_args, verbosity};
+use crate::log::{Log, Verbosity};
+use crate::scene_args::{self, SceneArgs};
+use clap::{Arg, ArgMatches};
 use hrr::effects::{self, Effect, Effects, Verdict};
 use hrr::integrator::Plan;
 use hrr::integrator::plan::plan;
@@ -16,6 +18,60 @@ use std::path::Path;
 
 /// Size of the pilot's image and number of its light subpaths.
 const PILOT: (u32, u32, u64) = (64, 48, 4096);
+
+/// The arguments of `hrr effects`.
+#[derive(Debug)]
+pub struct EffectsArgs {
+    /// The scene and its settings.
+    scene: SceneArgs,
+    /// The one effect whose evidence is wanted.
+    why: Option<Effect>,
+    /// For programs, not for people.
+    json: bool,
+    /// How much is said.
+    pub verbosity: Verbosity,
+}
+
+impl EffectsArgs {
+    pub fn new(m: &ArgMatches) -> Self {
+        Self {
+            scene: SceneArgs::new(m),
+            why: m.get_one::<Effect>("why").copied(),
+            json: m.get_one::<String>("format").is_some_and(|format| format == "json"),
+            verbosity: verbosity(m),
+        }
+    }
+}
+
+/// The sub-command.
+pub fn command() -> clap::Command {
+    const OUTPUT: &str = "Output";
+    clap::Command::new("effects")
+        .about("Say what a scene calls for, why, and what that switches on")
+        .after_help("'hrr effects --help' tells more.")
+        .after_long_help(EXIT_CODES)
+        .arg_required_else_help(true)
+        .next_line_help(false)
+        .arg(scene_args::scene())
+        .arg(
+            Arg::new("why")
+                .long("why")
+                .value_name("EFFECT")
+                .help_heading(OUTPUT)
+                .value_parser(|text: &str| text.parse::<Effect>())
+                .help("Show the evidence for one verdict: materials, triangles, bounds of textures, paths"),
+        )
+        .arg(
+            Arg::new("format")
+                .long("format")
+                .value_name("FORMAT")
+                .help_heading(OUTPUT)
+                .value_parser(["table", "json"])
+                .help("How it is said [default: table]"),
+        )
+        .args(scene_args::changes(|_| true))
+        .args(message_args())
+}
 
 /// The contract of `--format json`.
 #[derive(Serialize)]
@@ -44,21 +100,18 @@ struct PlanRow<'a> {
 
 /// Does it; returns the exit code.
 pub fn run(args: &EffectsArgs, log: &Log) -> Result<u8> {
-    let scene = Scene::load(&args.scene, &args.overrides)?;
-    for warning in &scene.warnings {
-        log.warning(warning);
-    }
-    let mut settings = scene.settings.clone();
-    crate::render::apply(&args.settings, &mut settings)?;
+    args.scene.check()?;
+    let (scene, settings) = args.scene.load(|warning| log.warning(warning))?;
     let effects = effects::analyze(&scene, &settings);
     let text = if let Some(effect) = args.why {
         why(&effects, effect)
     } else {
         let plan = plan(&scene, &settings, &effects)?;
         let cost = cost(&scene, &settings);
-        match args.format {
-            Format::Table => table(&effects, &plan, true, cost.as_ref()).join("\n") + "\n",
-            Format::Json => json(&effects, &plan, cost.as_ref()),
+        if args.json {
+            json(&effects, &plan, cost.as_ref())
+        } else {
+            table(&effects, &plan, true, cost.as_ref()).join("\n") + "\n"
         }
     };
     let fail = |e: std::io::Error| Error::Output { path: Path::new("-").to_owned(), message: e.to_string() };

@@ -89,6 +89,16 @@ pub fn duration(seconds: f64) -> String {
     }
 }
 
+/// A share of one as one reads it, to two digits: `2.3 %`, `0.12 %`.
+pub fn percent(share: f64) -> String {
+    let p = 100.0 * share;
+    if !(p > 0.0 && p < 1e6) {
+        return format!("{p} %");
+    }
+    let decimals = (1 - p.log10().floor() as i32).max(0) as usize;
+    format!("{p:.decimals$} %")
+}
+
 /// A large number as one reads it: three digits and a prefix.
 pub fn quantity(x: f64) -> String {
     let (value, prefix) = match x {
@@ -112,6 +122,12 @@ mod tests {
             all,
             ["0.0 s", "59.9 s", "1 min 00 s", "3 min 05 s", "59 min 59 s", "1 h 00 min", "2 h 03 min"]
         );
+    }
+
+    #[test]
+    fn percents_have_two_digits() {
+        let all = [0.0, 0.0234, 0.00123, 0.25, 1.5, f64::NAN].map(percent);
+        assert_eq!(all, ["0 %", "2.3 %", "0.12 %", "25 %", "150 %", "NaN %"]);
     }
 
     #[test]

@@ -1,13 +1,19 @@
 //! The program `hrr`: renders scenes from the command line, and says what they call for. Data goes to stdout, everything else to stderr.
 
 mod args;
+mod backends;
+mod compare;
+mod cost;
 mod effects;
 mod log;
+mod predict;
 mod progress;
+mod reference;
 mod render;
+mod scene_args;
 
 use args::Command;
-use log::Log;
+use log::{Log, Verbosity};
 use std::backtrace::{Backtrace, BacktraceStatus};
 use std::io::Write;
 use std::panic::{self, PanicHookInfo, UnwindSafe};
@@ -27,7 +33,7 @@ fn run() -> u8 {
         Ok(command) => command,
         Err(e) => return args::explain(&e),
     };
-    let (log, done) = match command {
+    let (log, result) = match command {
         Command::Render(args) => {
             let log = Log::new(args.verbosity);
             (log, render::run(&args, &log))
@@ -36,8 +42,25 @@ fn run() -> u8 {
             let log = Log::new(args.verbosity);
             (log, effects::run(&args, &log))
         }
+        Command::Compare(args) => (Log::new(Verbosity::Normal), compare::run(&args)),
+        Command::Reference(args) => {
+            let log = Log::new(args.verbosity);
+            (log, reference::run(&args, &log))
+        }
+        Command::Backends(args) => {
+            let log = Log::new(args.verbosity);
+            (log, backends::run(&args, &log))
+        }
+        Command::Cost(args) => {
+            let log = Log::new(args.verbosity);
+            (log, cost::run(&args, &log))
+        }
+        Command::Predict(args) => {
+            let log = Log::new(args.verbosity);
+            (log, predict::run(&args, &log))
+        }
     };
-    done.unwrap_or_else(|error| {
+    result.unwrap_or_else(|error| {
         log.error(&error);
         error.exit_code()
     })

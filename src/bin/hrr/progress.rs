@@ -1,6 +1,6 @@
 //! How far the render is: a bar on a terminal, a line now and then elsewhere.
 
-use crate::log::{Log, Verbosity, duration, quantity};
+use crate::log::{Log, Verbosity, duration, percent, quantity};
 use hrr::render::observer::{Observer, Progress};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::io::IsTerminal;
@@ -133,6 +133,9 @@ fn describe(p: &Progress, rate: Option<f64>) -> String {
     if let Some(remaining) = p.remaining() {
         text += &format!(", {} left", duration(remaining));
     }
+    if let Some(error) = p.error {
+        text += &format!(", error {}", percent(error));
+    }
     if let Some(rate) = rate {
         text += &format!(", {} connections/s", quantity(rate));
     }
@@ -150,8 +153,7 @@ mod tests {
             iterations: Some(10),
             fraction: 0.5,
             elapsed: 5.0,
-            accepted: 0,
-            time_limit: None,
+            ..Progress::default()
         };
         assert_eq!(
             describe(&p, Some(1.234e6)),
@@ -159,6 +161,8 @@ mod tests {
         );
         let last = Progress { iteration: 10, fraction: 0.0, ..p };
         assert_eq!(describe(&last, None), "iteration 10 of 10, 5.0 s, 0.0 s left");
+        let known = Progress { error: Some(0.0234), ..last };
+        assert_eq!(describe(&known, None), "iteration 10 of 10, 5.0 s, 0.0 s left, error 2.3 %");
         let timed = Progress { iterations: None, time_limit: Some(8.0), ..p };
         assert_eq!(describe(&timed, None), "iteration 3, 5.0 s, 3.0 s left");
     }

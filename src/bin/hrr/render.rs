@@ -1,39 +1,135 @@
 //! `hrr render`: a scene to images.
 
-use crate::args::RenderArgs;
-use crate::log::{Log, Verbosity, duration, quantity};
+use crate::args::{EXIT_CODES, exposure_arg, message_args, verbosity};
+use crate::log::{Log, Verbosity, duration, percent, quantity};
 use crate::progress::Reporter;
+use crate::scene_args::{self, SceneArgs};
+use clap::builder::ValueHint;
+use clap::{Arg, ArgAction, ArgMatches, value_parser};
 use hrr::effects;
-use hrr::error::Place;
 use hrr::file;
 use hrr::image::{self, Attributes, Format};
+use hrr::integrator;
 use hrr::integrator::Size;
-use hrr::integrator::{self, Plan};
 use hrr::render::counters::{Stats, peak_rss_bytes};
+use hrr::render::noise::LEAST_HILL;
+use hrr::render::{ErrorEstimate, Noise, Outcome};
 use hrr::scene::Scene;
-use hrr::settings::{Setting, SettingError, Settings};
+use hrr::settings::Settings;
 use hrr::{Error, Result};
 use std::io::Write;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Instant;
 
+/// The arguments of `hrr render`.
+#[derive(Debug)]
+pub struct RenderArgs {
+    /// The scene and its settings.
+    pub scene: SceneArgs,
+    /// Where the image goes; at least one file.
+    pub outputs: Vec<PathBuf>,
+    /// Where the variances of the pixels go.
+    pub variance: Option<PathBuf>,
+    /// Where the statistics go; `-` is stdout.
+    pub stats: Option<PathBuf>,
+    /// Stops by which PNG files are brighter.
+    pub exposure: f32,
+    /// How much is said.
+    pub verbosity: Verbosity,
+}
+
+const OUTPUT: &str = "Output";
+
+const EXAMPLES: &str = "\
+Examples:
+  hrr render scene.toml -o out.exr
+      the scene as its file says
+  hrr render scene.toml -o out.exr -o out.png --exposure 1 --time 30
+      30 seconds of rendering; an EXR file, and a PNG file one stop brighter
+  hrr render scene.toml -o out.exr --error 0.02 --time 600
+      until the relative error is below 2 % with 90 % confidence; exit code 1 if that takes longer than 10 minutes
+  hrr render model.obj -o quick.png --size 320x240 --iterations 4
+      a first look at a bare OBJ file
+  hrr render scene.toml -o a.exr -D camera.fov_y=30 -D material.mirror.alpha=\"[1e-3, 1e-3]\"
+      with two keys of the scene file changed
+
+What is given here wins over the scene file, which wins over the defaults.
+Ctrl-C finishes the iteration and writes the image; a second one stops at once.";
+
+impl RenderArgs {
+    pub fn new(m: &ArgMatches) -> Self {
+        Self {
+            scene: SceneArgs::new(m),
+            outputs: m.get_many::<PathBuf>("output").into_iter().flatten().cloned().collect(),
+            variance: m.get_one::<PathBuf>("variance").cloned(),
+            stats: m.get_one::<PathBuf>("stats").cloned(),
+            exposure: m.get_one::<f32>("exposure").copied().unwrap_or(0.0),
+            verbosity: verbosity(m),
+        }
+    }
+}
+
+/// The sub-command.
+pub fn command() -> clap::Command {
+    clap::Command::new("render")
+        .about("Render a scene to an image")
+        .after_help("'hrr render --help' tells more, with examples.")
+        .after_long_help(format!("{EXAMPLES}\n\n{EXIT_CODES}"))
+        .arg_required_else_help(true)
+        .next_line_help(false)
+        .arg(scene_args::scene())
+        .args(output_args())
+        .args(scene_args::changes(|_| true))
+        .args(message_args())
+}
+
+fn output_args() -> [Arg; 5] {
+    [
+        Arg::new("output")
+            .short('o')
+            .long("output")
+            .value_name("FILE")
+            .help_heading(OUTPUT)
+            .required(true)
+            .action(ArgAction::Append)
+            .value_parser(value_parser!(PathBuf))
+            .value_hint(ValueHint::FilePath)
+            .help("Where the image goes: .exr (linear) or .png (sRGB); may be repeated"),
+        Arg::new("variance")
+            .long("variance")
+            .value_name("FILE")
+            .help_heading(OUTPUT)
+            .value_parser(value_parser!(PathBuf))
+            .value_hint(ValueHint::FilePath)
+            .help("Where the variance of each pixel goes: .exr, squares of the image's unit")
+            .long_help(
+                "Where the variance of each pixel goes: .exr, squares of the image's unit\nIt is told from how the \
+                 iterations differ; 'hrr compare' takes it.",
+            ),
+        Arg::new("stats")
+            .long("stats")
+            .value_name("FILE")
+            .help_heading(OUTPUT)
+            .value_parser(value_parser!(PathBuf))
+            .value_hint(ValueHint::FilePath)
+            .help("Where times and counts go, as JSON; '-' is stdout"),
+        scene_args::size(OUTPUT),
+        exposure_arg(OUTPUT, "Makes PNG files brighter, or darker when negative"),
+    ]
+}
+
 /// Exit code of a render that was stopped, as shells have it for SIGINT.
-const INTERRUPTED: u8 = 130;
+pub const INTERRUPTED: u8 = 130;
 
 /// Does it; returns the exit code.
 pub fn run(args: &RenderArgs, log: &Log) -> Result<u8> {
     let start = Instant::now();
     // What cannot succeed is said before any work is done.
-    apply(&args.settings, &mut Settings::default())?;
+    args.scene.check()?;
     check_outputs(args)?;
 
-    let scene = Scene::load(&args.scene, &args.overrides)?;
-    for warning in &scene.warnings {
-        log.warning(warning);
-    }
-    let mut settings = scene.settings.clone();
-    apply(&args.settings, &mut settings)?;
+    let (scene, settings) = args.scene.load(|warning| log.warning(warning))?;
     let load = start.elapsed().as_secs_f64();
     announce(&scene, &settings, load, log);
 
@@ -43,7 +139,7 @@ pub fn run(args: &RenderArgs, log: &Log) -> Result<u8> {
     reporter.finish();
     let outcome = outcome?;
 
-    let mut stats = outcome.stats;
+    let mut stats = outcome.stats.clone();
     if stats.iterations == 0 {
         // A black image must not take the place of a good one.
         log.info("stopped before an iteration was finished: nothing was written");
@@ -51,7 +147,8 @@ pub fn run(args: &RenderArgs, log: &Log) -> Result<u8> {
     }
     stats.seconds.load = load;
     let image = outcome.film.image();
-    let mut attributes = attributes(&scene, &settings, &stats, outcome.film.samples(), &outcome.plan);
+    let error = outcome.noise.error();
+    let mut attributes = attributes(&scene, &settings, &outcome, &stats);
     if !outcome.sizes.is_empty() {
         attributes.set("hrr:sizes", sizes(&outcome.sizes));
     }
@@ -61,32 +158,57 @@ pub fn run(args: &RenderArgs, log: &Log) -> Result<u8> {
         Format::Png => image::write(path, &image.exposed(args.exposure), &attributes),
     });
     let written: Vec<Result<()>> = written.collect();
+    let variance =
+        args.variance.as_deref().map_or(Ok(()), |path| write_variance(path, &outcome.noise, &attributes));
     stats.memory.peak_rss_bytes = stats.memory.peak_rss_bytes.max(peak_rss_bytes());
     stats.seconds.total = start.elapsed().as_secs_f64();
     let reported = args.stats.as_deref().map_or(Ok(()), |path| write_stats(path, &stats));
-    written.into_iter().chain([reported]).collect::<Result<()>>()?;
+    written.into_iter().chain([variance, reported]).collect::<Result<()>>()?;
 
     details(&stats, log);
     if !outcome.sizes.is_empty() {
         log.detail(format_args!("{:>20}  {}", "sizes", sizes(&outcome.sizes)));
     }
-    summary(args, &stats, outcome.interrupted, log);
-    Ok(if outcome.interrupted { INTERRUPTED } else { 0 })
+    summary(args, &stats, error, outcome.interrupted, log);
+    let missed = judge(&settings, error, &stats.integrator, log);
+    Ok(match (outcome.interrupted, missed) {
+        (true, _) => INTERRUPTED,
+        (false, missed) => u8::from(missed),
+    })
 }
 
-/// Gives the settings the values of the flags.
-pub fn apply(given: &[(&'static Setting, String)], settings: &mut Settings) -> Result<()> {
-    for (setting, value) in given {
-        let flag = format!("--{}", setting.name.replace('_', "-"));
-        setting.set(settings, value).map_err(|e| match e {
-            SettingError::Invalid(message) => Error::Usage(format!("{flag}: {message}")),
-            SettingError::NotYet(message) => Error::Unsupported { place: Place::file(flag), message },
-        })?;
+/// Says how far the error can be trusted; returns whether a target was missed.
+fn judge(settings: &Settings, error: Option<ErrorEstimate>, integrator: &str, log: &Log) -> bool {
+    if settings.error.is_some() && (integrator.starts_with("vcm") || integrator.starts_with("pcvcm")) {
+        log.warning("vertex merging blurs; the error tells noise only, not the blur");
     }
-    Ok(())
+    if let Some(e) = error.filter(|e| !e.is_sure()) {
+        let message = format_args!(
+            "no promise: rare bright samples make the noise (Hill index {:.1}; below {LEAST_HILL} its square is not known, \
+             below 2 it has no mean), and rarer and brighter ones may not have been found yet",
+            e.hill
+        );
+        if settings.error.is_some() { log.warning(message) } else { log.detail(message) }
+    }
+    let Some(target) = settings.error else { return false };
+    let missed = error.is_none_or(|e| e.bound > target);
+    if missed {
+        let reached = error.map_or("not known yet".to_owned(), |e| percent(e.bound));
+        log.warning(format_args!("the error of {} was not reached: it is {reached}", percent(target)));
+    }
+    missed
 }
 
 fn check_outputs(args: &RenderArgs) -> Result<()> {
+    if let Some(path) = &args.variance {
+        if Format::of(path)? != Format::Exr {
+            return Err(Error::Output {
+                path: path.clone(),
+                message: "variances are written as .exr".into(),
+            });
+        }
+        image::check_writable(path)?;
+    }
     args.outputs.iter().try_for_each(|path| image::check_writable(path))?;
     match &args.stats {
         Some(path) if !is_stdout(path) => file::check_writable(path),
@@ -95,7 +217,7 @@ fn check_outputs(args: &RenderArgs) -> Result<()> {
 }
 
 /// The first Ctrl-C lets the iteration be finished, the second one ends the program.
-fn stop_on_interrupt(reporter: &Arc<Reporter>) -> Result<()> {
+pub fn stop_on_interrupt(reporter: &Arc<Reporter>) -> Result<()> {
     let reporter = reporter.clone();
     let handler = move || {
         if !reporter.stop() {
@@ -107,7 +229,8 @@ fn stop_on_interrupt(reporter: &Arc<Reporter>) -> Result<()> {
 }
 
 /// What an EXR file says about its making.
-fn attributes(scene: &Scene, settings: &Settings, stats: &Stats, samples: u64, plan: &Plan) -> Attributes {
+fn attributes(scene: &Scene, settings: &Settings, outcome: &Outcome, stats: &Stats) -> Attributes {
+    let (samples, plan) = (outcome.film.samples(), &outcome.plan);
     let mut a = Attributes::new();
     a.set("samplesPerPixel", samples);
     a.set("renderTimeSeconds", stats.seconds.render as f32);
@@ -124,7 +247,20 @@ fn attributes(scene: &Scene, settings: &Settings, stats: &Stats, samples: u64, p
     a.set("hrr:effects", verdicts.join(" "));
     a.set("hrr:machinery", plan.machinery.join(" "));
     a.set("hrr:biased", u64::from(plan.is_biased()));
+    if let Some(error) = outcome.noise.error() {
+        a.set("hrr:error", error.expected as f32);
+        a.set("hrr:errorBound90", error.bound as f32);
+        a.set("hrr:hillIndex", error.hill as f32);
+    }
     a
+}
+
+fn write_variance(path: &Path, noise: &Noise, attributes: &Attributes) -> Result<()> {
+    let variance = noise.variance().ok_or_else(|| Error::Output {
+        path: path.to_owned(),
+        message: "one iteration tells no variance; run at least two".into(),
+    })?;
+    image::write(path, &variance, attributes)
 }
 
 /// Samples x light subpaths of each iteration, and what it counts for.
@@ -148,9 +284,13 @@ fn write_stats(path: &Path, stats: &Stats) -> Result<()> {
 }
 
 fn announce(scene: &Scene, settings: &Settings, load: f64, log: &Log) {
-    let budget = match settings.time {
-        Some(seconds) => duration(seconds),
-        None => format!("{} iterations", settings.iterations),
+    let budget = match (settings.error, settings.time) {
+        (Some(error), None) => format!("to an error of {}", percent(error)),
+        (Some(error), Some(seconds)) => {
+            format!("to an error of {}, {} at most", percent(error), duration(seconds))
+        }
+        (None, Some(seconds)) => duration(seconds),
+        (None, None) => format!("{} iterations", settings.iterations),
     };
     log.info(format_args!(
         "rendering {}: {} triangles, {}x{} pixels, {budget}",
@@ -205,11 +345,14 @@ fn details(stats: &Stats, log: &Log) {
 }
 
 /// The last line: where the image is.
-fn summary(args: &RenderArgs, stats: &Stats, interrupted: bool, log: &Log) {
+fn summary(args: &RenderArgs, stats: &Stats, error: Option<ErrorEstimate>, interrupted: bool, log: &Log) {
     let files: Vec<_> = args.outputs.iter().map(|p| p.display().to_string()).collect();
     let s = if stats.iterations == 1 { "" } else { "s" };
+    let error = error.map_or(String::new(), |e| {
+        format!(", error {} (below {} with 90 % confidence)", percent(e.expected), percent(e.bound))
+    });
     log.info(format_args!(
-        "{}{}: {} iteration{s} in {}",
+        "{}{}: {} iteration{s} in {}{error}",
         if interrupted { "stopped; " } else { "" },
         files.join(", "),
         stats.iterations,

@@ -1,0 +1,236 @@
+//! What a study's rows say: error against time with intervals, time to unit variance, and what could have been predicted.
+
+use super::bootstrap::Interval;
+use super::results::{Results, Row};
+use crate::math::relative::median;
+
+/// Rungs that the longest is predicted from.
+const FITTED: usize = 4;
+
+/// A point of a setting's curve: all runs after as many iterations.
+#[derive(Debug, Clone)]
+pub struct Rung {
+    /// Iterations.
+    pub iterations: u64,
+    /// Median wall-clock seconds.
+    pub seconds: f64,
+    /// Error: the root of the mean of the runs' squares.
+    pub error: Interval,
+}
+
+/// The longest rung as the shorter ones predict it.
+#[derive(Debug, Clone)]
+pub struct Prediction {
+    /// Predicted error, with the interval that it was said to lie in.
+    pub error: Interval,
+    /// Predicted seconds to the error that the longest rung had.
+    pub seconds: f64,
+    /// What was measured.
+    pub measured: f64,
+    /// Seconds that it took.
+    pub measured_seconds: f64,
+}
+
+/// A setting's results.
+#[derive(Debug, Clone)]
+pub struct Curve {
+    /// The setting.
+    pub name: String,
+    /// Whether it blurs.
+    pub biased: bool,
+    /// Runs.
+    pub runs: usize,
+    /// Its rungs, by iterations.
+    pub rungs: Vec<Rung>,
+    /// Seconds to an error of 1 (100 %), which noise halves in four times the time: variance times seconds.
+    pub unit: Interval,
+    /// That of the first setting over it: how many times as fast this one is.
+    pub speedup: Interval,
+    /// From all rungs but the longest; `None` for settings that blur, and when there are fewer than three.
+    pub prediction: Option<Prediction>,
+    /// Mean seconds of each stage at the longest rung, summed over threads.
+    pub stages: [f64; 5],
+    /// Mean fireflies at the longest rung.
+    pub fireflies: f64,
+}
+
+impl Curve {
+    /// Whether the interval of the speed-up leaves open which one is faster.
+    pub fn is_unresolved(&self) -> bool {
+        self.speedup.holds(1.0)
+    }
+}
+
+/// The rows of a setting, by rung and run.
+struct Table<'a> {
+    rungs: Vec<(u64, Vec<&'a Row>)>,
+    runs: usize,
+}
+
+impl<'a> Table<'a> {
+    fn new(results: &'a Results, name: &str) -> Self {
+        let mut rungs: Vec<(u64, Vec<&Row>)> = Vec::new();
+        for row in results.rows.iter().filter(|r| r.setting == name) {
+            match rungs.iter_mut().find(|(n, _)| *n == row.iterations) {
+                Some((_, rows)) => rows.push(row),
+                None => rungs.push((row.iterations, vec![row])),
+            }
+        }
+        rungs.sort_by_key(|(n, _)| *n);
+        let runs = rungs.iter().map(|(_, rows)| rows.len()).min().unwrap_or(0);
+        Self { rungs, runs }
+    }
+
+    fn mean(&self, rung: usize, runs: &[usize], value: impl Fn(&Row) -> f64) -> f64 {
+        runs.iter().map(|&r| value(self.rungs[rung].1[r])).sum::<f64>() / runs.len() as f64
+    }
+
+    /// The median run's seconds: a run that another program held up does not count.
+    fn seconds(&self, rung: usize, runs: &[usize]) -> f64 {
+        median(&mut runs.iter().map(|&r| self.rungs[rung].1[r].seconds).collect::<Vec<_>>())
+    }
+
+    /// Variance of the error times seconds, at the longest rung.
+    fn unit(&self, runs: &[usize]) -> f64 {
+        let last = self.rungs.len() - 1;
+        self.mean(last, runs, |r| r.square).max(0.0) * self.seconds(last, runs)
+    }
+
+    /// The line through the rungs below the longest, at most [`FITTED`]: intercept and slope of the logarithm of the
+    /// square error over that of the iterations. The slope of noise is -1 but for what is trimmed off, which is more where
+    /// few iterations leave rarer peaks.
+    fn fit(&self, runs: &[usize]) -> (f64, f64) {
+        let below = self.rungs.len() - 1;
+        let rungs = below.saturating_sub(FITTED)..below;
+        let n = rungs.len() as f64;
+        let points: Vec<[f64; 2]> = rungs
+            .map(|k| {
+                let square = self.mean(k, runs, |r| r.square).max(f64::MIN_POSITIVE);
+                [(self.rungs[k].0 as f64).ln(), square.ln()]
+            })
+            .collect();
+        let mean = |i: usize| points.iter().map(|p| p[i]).sum::<f64>() / n;
+        let (x, y) = (mean(0), mean(1));
+        let slope = points.iter().map(|p| (p[0] - x) * (p[1] - y)).sum::<f64>()
+            / points.iter().map(|p| (p[0] - x).powi(2)).sum::<f64>();
+        (y - slope * x, slope)
+    }
+}
+
+/// All settings' curves; speed-ups are over the first.
+pub fn curves(results: &Results) -> Vec<Curve> {
+    let names = results.settings();
+    let Some(first) = names.first().map(|name| Table::new(results, name)) else { return Vec::new() };
+    names.iter().map(|name| curve(name, &Table::new(results, name), &first)).collect()
+}
+
+fn curve(name: &str, table: &Table<'_>, first: &Table<'_>) -> Curve {
+    let n = table.runs;
+    let all: Vec<usize> = (0..n).collect();
+    let rungs: Vec<Rung> = (0..table.rungs.len())
+        .map(|k| Rung {
+            iterations: table.rungs[k].0,
+            seconds: table.seconds(k, &all),
+            error: Interval::new(n, |runs| table.mean(k, runs, |r| r.square).max(0.0).sqrt()),
+        })
+        .collect();
+    let last = rungs.len() - 1;
+    let biased = table.rungs[0].1[0].biased;
+    Curve {
+        name: name.to_owned(),
+        biased,
+        runs: n,
+        unit: Interval::new(n, |runs| table.unit(runs)),
+        // Runs with the same number were interleaved: the machine was as busy.
+        speedup: Interval::new(n.min(first.runs), |runs| first.unit(runs) / table.unit(runs)),
+        prediction: (!biased && rungs.len() >= 3).then(|| predict(table, &rungs)),
+        stages: std::array::from_fn(|s| table.mean(last, &all, |r| r.stages[s])),
+        fireflies: table.mean(last, &all, |r| r.fireflies as f64),
+        rungs,
+    }
+}
+
+fn predict(table: &Table<'_>, rungs: &[Rung]) -> Prediction {
+    let (n, last) = (table.runs, rungs.len() - 1);
+    let all: Vec<usize> = (0..n).collect();
+    let iterations = rungs[last].iterations as f64;
+    let below = last - 1;
+    let level = table.mean(below, &all, |r| r.square);
+    let error = Interval::new(n, |runs| {
+        // What is measured is a mean of as many runs, and errs as much: others, shifted by half.
+        let others: Vec<usize> = runs.iter().rev().map(|r| (r * 7 + 3) % n).collect();
+        let chance = if runs == all { 1.0 } else { table.mean(below, &others, |r| r.square) / level };
+        let (intercept, slope) = table.fit(runs);
+        ((intercept + slope * iterations.ln()).exp() * chance).max(0.0).sqrt()
+    });
+    let measured = rungs[last].error.value;
+    let setup = median(&mut table.rungs[below].1.iter().map(|r| r.setup).collect::<Vec<_>>());
+    let per_iteration = (rungs[below].seconds - setup) / rungs[below].iterations as f64;
+    let (intercept, slope) = table.fit(&all);
+    let needed = ((2.0 * measured.max(f64::MIN_POSITIVE).ln() - intercept) / slope).exp();
+    Prediction {
+        error,
+        seconds: setup + per_iteration * needed,
+        measured,
+        measured_seconds: rungs[last].seconds,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::sampler::counter::{combine, mix, unit};
+
+    /// Runs whose squares are `variance / n` times a number of mean 1, after `seconds` an iteration.
+    fn rows(setting: &str, variance: f64, seconds: f64, key: u64) -> Vec<Row> {
+        let mut rows = Vec::new();
+        for run in 0..16 {
+            for n in [1u64, 2, 4, 8, 16] {
+                let u = unit(mix(combine(combine(key, run), n)));
+                rows.push(Row {
+                    setting: setting.into(),
+                    biased: false,
+                    run: run as usize,
+                    iterations: n,
+                    seconds: 0.5 + seconds * n as f64,
+                    setup: 0.5,
+                    square: variance / n as f64 * (0.8 + 0.4 * u),
+                    fireflies: 1,
+                    stages: [1.0, 2.0, 3.0, 4.0, 5.0],
+                });
+            }
+        }
+        rows
+    }
+
+    #[test]
+    fn speed_is_the_ratio_of_variance_times_time() {
+        let both = [rows("a", 1.0, 1.0, 1), rows("b", 0.5, 1.0, 2)].concat();
+        let found = curves(&Results { about: Vec::new(), rows: both });
+        let [a, b] = &found[..] else { panic!() };
+        assert_eq!((a.runs, a.rungs.len(), a.stages[4], a.fireflies), (16, 5, 5.0, 1.0));
+        assert!((a.unit.value - 16.5 / 16.0).abs() < 0.1 && a.unit.low < a.unit.value);
+        assert!(b.speedup.holds(2.0) && !b.is_unresolved(), "{b:?}");
+        assert!(a.is_unresolved());
+        // Of equals, one in ten pairs is told apart by chance.
+        let equal = |key: u64| {
+            let both = [rows("a", 1.0, 1.0, 2 * key), rows("b", 1.0, 1.0, 2 * key + 1)].concat();
+            curves(&Results { about: Vec::new(), rows: both })[1].is_unresolved()
+        };
+        let unresolved = (0..60).filter(|&key| equal(key)).count();
+        assert!((45..60).contains(&unresolved), "{unresolved} of 60");
+    }
+
+    #[test]
+    fn the_longest_rung_is_predicted_from_the_others() {
+        let mut inside = 0;
+        for key in 0..100 {
+            let curves = curves(&Results { about: Vec::new(), rows: rows("a", 1.0, 2.0, 100 + key) });
+            let p = curves[0].prediction.as_ref().unwrap();
+            assert!((p.error.value / p.measured - 1.0).abs() < 0.1);
+            assert!((p.seconds / p.measured_seconds - 1.0).abs() < 0.15, "{p:?}");
+            inside += u32::from(p.error.holds(p.measured));
+        }
+        assert!((80..=100).contains(&inside), "{inside} of 100");
+    }
+}

@@ -1,0 +1,289 @@
+//! A study: several settings of one scene, each run many times for a power-of-two ladder of iterations, in turn.
+
+use super::metric;
+use super::results::Row;
+use crate::error::{Error, Result};
+use crate::film::Film;
+use crate::image::Image;
+use crate::integrator;
+use crate::math::luminance;
+use crate::math::relative::{Tiles, floor, local_square, trimmed_mean};
+use crate::render::noise::TRIMMED;
+use crate::sampler::counter::combine;
+use crate::scene::Scene;
+use crate::settings::Settings;
+use crate::subpath::World;
+use glam::Vec3;
+use std::time::Instant;
+
+/// Most bytes of images that a study may keep.
+const MOST_BYTES: usize = 2 << 30;
+/// Iterations of the longest rung at most.
+const MOST_ITERATIONS: u64 = 1 << 12;
+/// A pixel this many times brighter than itself and its tile is a firefly.
+const FIREFLY: f64 = 10.0;
+
+/// A setting of a study.
+#[derive(Debug, Clone)]
+pub struct Contender {
+    /// Name, without commas.
+    pub name: String,
+    /// Its settings; budgets are not looked at.
+    pub settings: Settings,
+    /// Whether it blurs, so that its mean is no reference.
+    pub biased: bool,
+}
+
+/// What is compared with.
+#[derive(Debug, Clone)]
+pub struct Reference {
+    /// The mean.
+    pub mean: Image,
+    /// Variance of each pixel's mean.
+    pub variance: Image,
+}
+
+/// A finished study.
+#[derive(Debug)]
+pub struct Study {
+    /// By setting, run and iterations.
+    pub rows: Vec<Row>,
+    /// What errors were measured against.
+    pub reference: Reference,
+    /// The setting that it is made of; `None` when it was given.
+    pub owner: Option<usize>,
+    /// An image of each setting: the first run's longest.
+    pub images: Vec<Image>,
+    /// Iterations of each setting's longest rung.
+    pub longest: Vec<u64>,
+}
+
+/// One run's images on the ladder, and what they cost.
+struct Ladder {
+    images: Vec<Image>,
+    costs: Vec<(u64, f64, f64, [f64; 5])>,
+}
+
+/// Runs it. Each run of each setting gets an equal share of `seconds`; the first runs show how many iterations that is.
+/// `runs` is at least 2. `tell` is told the finished share; false from it ends the study with an error.
+///
+/// # Errors
+/// What rendering reports; [`Error::Memory`] when the images would not fit.
+pub fn run(
+    scene: &Scene,
+    contenders: &[Contender],
+    runs: usize,
+    seconds: f64,
+    given: Option<Reference>,
+    tell: &dyn Fn(f64) -> bool,
+) -> Result<Study> {
+    let share = seconds / (runs.max(2) * contenders.len().max(1)) as f64;
+    let mut ladders: Vec<Vec<Ladder>> = contenders.iter().map(|_| Vec::new()).collect();
+    let mut longest = vec![None; contenders.len()];
+    let mut worlds: Vec<World<'_>> = Vec::new();
+    for contender in contenders {
+        worlds.push(World::new(scene, &contender.settings)?);
+    }
+    for run in 0..runs.max(2) {
+        for (i, contender) in contenders.iter().enumerate() {
+            if !tell((run * contenders.len() + i) as f64 / (runs.max(2) * contenders.len()) as f64) {
+                return Err(Error::Input("stopped: nothing was written".into()));
+            }
+            let settings = Settings {
+                seed: combine(contender.settings.seed, run as u64) >> 1,
+                ..contender.settings.clone()
+            };
+            let ladder = climb(&worlds[i], scene, &settings, share, longest[i])?;
+            longest[i] = ladder.costs.last().map(|c| c.0);
+            ladders[i].push(ladder);
+        }
+        let kept: usize =
+            ladders.iter().flatten().flat_map(|l| &l.images).map(|i| size_of_val(&i.pixels[..])).sum();
+        if kept / (run + 1) * runs > MOST_BYTES {
+            return Err(Error::Memory(
+                "the study keeps an image of each run and rung: choose a smaller --size".into(),
+            ));
+        }
+    }
+    Ok(measure(contenders, &ladders, given))
+}
+
+/// Runs one ladder: up to `longest` iterations, or until the time is up.
+fn climb(
+    world: &World<'_>,
+    scene: &Scene,
+    settings: &Settings,
+    seconds: f64,
+    longest: Option<u64>,
+) -> Result<Ladder> {
+    let start = Instant::now();
+    let mut machine = integrator::new(world, settings)?;
+    let setup = start.elapsed().as_secs_f64();
+    let mut film = Film::new(&scene.film);
+    let mut ladder = Ladder { images: Vec::new(), costs: Vec::new() };
+    let mut stages = [0.0; 5];
+    let mut elapsed = setup;
+    for iteration in 0..MOST_ITERATIONS {
+        let start = Instant::now();
+        let tally = machine.iterate(iteration, &mut film, &|_| ())?;
+        elapsed += start.elapsed().as_secs_f64();
+        let more = [
+            tally.light_trace,
+            tally.vertex_bvh_build,
+            tally.eye_trace,
+            tally.roulette_seconds,
+            tally.visibility,
+        ];
+        stages.iter_mut().zip(more).for_each(|(s, m)| *s += m);
+        let done = iteration + 1;
+        if done.is_power_of_two() {
+            ladder.images.push(film.image());
+            ladder.costs.push((done, elapsed, setup, stages));
+            // The next rung takes as long as all so far.
+            let up = match longest {
+                Some(longest) => done >= longest,
+                None => done >= 4 && 2.0 * elapsed > seconds,
+            };
+            if up {
+                break;
+            }
+        }
+    }
+    Ok(ladder)
+}
+
+fn measure(contenders: &[Contender], ladders: &[Vec<Ladder>], given: Option<Reference>) -> Study {
+    let tops: Vec<Vec<&Image>> =
+        ladders.iter().map(|runs| runs.iter().filter_map(|l| l.images.last()).collect()).collect();
+    let means: Vec<Reference> = tops.iter().map(|images| mean_and_variance(images)).collect();
+    // The one that knows most; its own runs are measured with their share in it taken off.
+    let noise = |r: &Reference| Yardstick::new(r).noise();
+    let unbiased = (0..contenders.len()).filter(|&i| !contenders[i].biased);
+    let owner = if given.is_some() {
+        None
+    } else {
+        unbiased.min_by(|&a, &b| noise(&means[a]).total_cmp(&noise(&means[b]))).or(Some(0))
+    };
+    let reference = given.unwrap_or_else(|| means[owner.unwrap_or(0)].clone());
+    let yardstick = Yardstick::new(&reference);
+    let own_noise = yardstick.noise();
+    let mut rows = Vec::new();
+    for (i, (contender, runs)) in contenders.iter().zip(ladders).enumerate() {
+        for (run, ladder) in runs.iter().enumerate() {
+            for (image, &(iterations, seconds, setup, stages)) in ladder.images.iter().zip(&ladder.costs) {
+                let measured = yardstick.square(image);
+                let longest = ladder.costs.last().map_or(1, |c| c.0);
+                let square = if owner == Some(i) {
+                    measured / (1.0 - iterations as f64 / (longest * runs.len() as u64) as f64)
+                } else {
+                    measured - own_noise
+                };
+                let fireflies = yardstick.fireflies(image);
+                let (setting, biased) = (contender.name.clone(), contender.biased);
+                rows.push(Row {
+                    setting,
+                    biased,
+                    run,
+                    iterations,
+                    seconds,
+                    setup,
+                    square,
+                    fireflies,
+                    stages,
+                });
+            }
+        }
+    }
+    Study {
+        rows,
+        owner,
+        images: tops.iter().map(|images| images[0].clone()).collect(),
+        longest: ladders.iter().map(|runs| runs[0].costs.last().map_or(0, |c| c.0)).collect(),
+        reference,
+    }
+}
+
+/// Errors relative to a reference, as [`metric::Metrics::error`] has them.
+struct Yardstick<'a> {
+    reference: &'a Reference,
+    grid: Tiles,
+    tiles: Vec<f64>,
+    eps: f64,
+}
+
+impl<'a> Yardstick<'a> {
+    fn new(reference: &'a Reference) -> Self {
+        let mean = &reference.mean;
+        let grid = Tiles::new(mean.width, mean.height);
+        let tiles = grid.means(|x, y| luminance(mean.pixels[(y * mean.width + x) as usize].as_dvec3()));
+        let all = mean.pixels.iter().map(|p| luminance(p.as_dvec3())).sum::<f64>();
+        Self { reference, grid, tiles, eps: floor(all / mean.pixels.len() as f64) }
+    }
+
+    fn tile(&self, i: usize) -> f64 {
+        let width = self.reference.mean.width;
+        self.tiles[self.grid.of(i as u32 % width, i as u32 / width)]
+    }
+
+    fn trimmed(&self, square: impl Fn(usize) -> glam::DVec3) -> f64 {
+        let n = self.reference.mean.pixels.len();
+        let mut values: Vec<f64> = (0..n).map(|i| local_square(square(i), self.tile(i), self.eps)).collect();
+        trimmed_mean(&mut values, TRIMMED)
+    }
+
+    fn square(&self, image: &Image) -> f64 {
+        self.trimmed(|i| {
+            let d = image.pixels[i].as_dvec3() - self.reference.mean.pixels[i].as_dvec3();
+            d * d
+        })
+    }
+
+    /// The same of the reference itself.
+    fn noise(&self) -> f64 {
+        self.trimmed(|i| self.reference.variance.pixels[i].as_dvec3())
+    }
+
+    fn fireflies(&self, image: &Image) -> u64 {
+        let bright = |i: usize| {
+            let own = luminance(self.reference.mean.pixels[i].as_dvec3());
+            luminance(image.pixels[i].as_dvec3()) > FIREFLY * own.max(self.tile(i)).max(self.eps)
+        };
+        (0..image.pixels.len()).filter(|&i| bright(i)).count() as u64
+    }
+}
+
+/// Of independent images.
+fn mean_and_variance(images: &[&Image]) -> Reference {
+    let n = images.len() as f32;
+    let pixel = |i: usize| {
+        let mean = images.iter().map(|image| image.pixels[i]).sum::<Vec3>() / n;
+        let squares =
+            images.iter().map(|image| (image.pixels[i] - mean) * (image.pixels[i] - mean)).sum::<Vec3>();
+        (mean, squares / (n * (n - 1.0)))
+    };
+    let (mean, variance) = (0..images[0].pixels.len()).map(pixel).unzip();
+    let (width, height) = (images[0].width, images[0].height);
+    Reference {
+        mean: Image { width, height, pixels: mean },
+        variance: Image { width, height, pixels: variance },
+    }
+}
+
+/// Where an image differs from the reference in a person's eye: dark to bright by LDR-FLIP.
+///
+/// # Errors
+/// As [`metric::compare`].
+pub fn deviation_map(image: &Image, reference: &Image, exposure: f32) -> Result<Image> {
+    metric::compare(image, reference, None, exposure)?;
+    let [a, b] = [image, reference].map(|i| i.exposed(exposure));
+    let map = super::flip::map(&a, &b, super::flip::PIXELS_PER_DEGREE);
+    // Black, violet, orange, white.
+    let ramp =
+        [Vec3::ZERO, Vec3::new(0.25, 0.02, 0.35), Vec3::new(0.95, 0.25, 0.08), Vec3::new(1.0, 0.95, 0.8)];
+    let colour = |v: f64| {
+        let at = (v.clamp(0.0, 1.0) as f32) * 3.0;
+        let k = (at as usize).min(2);
+        ramp[k].lerp(ramp[k + 1], at - k as f32)
+    };
+    Ok(Image { pixels: map.into_iter().map(colour).collect(), ..*image })
+}
