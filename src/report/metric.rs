@@ -27,7 +27,7 @@ pub struct Metrics {
     /// The same without the worst hundredth of the pixels.
     pub relmse_trim1: f64,
     /// Root of the mean square difference of all pixels but the worst thousandth, relative to the reference's tiles
-    /// ([`local_square`](crate::math::relative::local_square)): what `hrr render --error` estimates.
+    /// ([`crate::math::relative::local_square`]): what `hrr render --error` estimates.
     pub error: f64,
     /// Root of the median pixel's relative square difference.
     pub median_nrmse: f64,

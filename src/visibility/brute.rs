@@ -27,6 +27,10 @@ impl Brute {
 }
 
 impl Visibility for Brute {
+    fn bytes(&self) -> Option<u64> {
+        Some((self.triangles.len() * size_of::<[Vec3; 3]>()) as u64)
+    }
+
     /// Of several triangles at the same distance the first counts.
     fn intersect(&self, ray: &Ray) -> Option<Hit> {
         let shear = Shear::new(ray);

@@ -25,7 +25,7 @@ pub struct SceneArgs {
 
 impl SceneArgs {
     pub fn new(m: &ArgMatches) -> Self {
-        let size = m.get_one::<(u32, u32)>("size");
+        let size = m.try_get_one::<(u32, u32)>("size").ok().flatten();
         let size = size.iter().flat_map(|(w, h)| {
             [("film.width".to_owned(), w.to_string()), ("film.height".to_owned(), h.to_string())]
         });
