@@ -13,7 +13,7 @@ use crate::light_cache::LightCache;
 use crate::material::Material;
 use crate::math::Spectrum;
 use crate::roulette::{self, Query};
-use crate::sampler::{Purpose, Sampler, Stream};
+use crate::sampler::{Family, Purpose, Sampler, Stream};
 use crate::settings::{Settings, Switch};
 use crate::subpath::{Origin, Storing, Walk, World};
 use crate::tally::{Clock, Tally};
@@ -177,7 +177,7 @@ impl<'a> Bidirectional<'a> {
         let [mut cache, mut picks] = [(); 2].map(|()| LightCache::default());
         for index in subpaths {
             let sampler =
-                Sampler::in_family(self.settings.seed, iteration, stream, index >> 32, index as u32);
+                Family::new(self.settings.seed, iteration, stream, index >> 32).member(index as u32);
             let picked = self.picks_apart() && index < PICKED;
             let mut walk = self.techniques.emit(world, &sampler);
             while let Some(light) = walk.filter(|light| light.depth < self.settings.max_depth) {

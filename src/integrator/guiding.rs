@@ -6,7 +6,7 @@ use crate::connect::EyeVertex;
 use crate::error::Result;
 use crate::light::EmissionGuide;
 use crate::math::luminance;
-use crate::sampler::{Purpose, Sampler, Stream};
+use crate::sampler::{Family, Purpose, Sampler, Stream};
 use crate::subpath::from_light;
 use crate::tally::{Clock, Tally};
 use glam::DVec2;
@@ -51,7 +51,7 @@ impl Bidirectional<'_> {
         let (world, seed) = (self.world, self.settings.seed);
         let observations = found.into_iter().flatten().filter_map(|(vertex, score)| {
             let subpath = self.cache.subpath_of(vertex as usize) as u64;
-            let sampler = Sampler::in_family(seed, 0, Stream::GuideLight, subpath >> 32, subpath as u32);
+            let sampler = Family::new(seed, 0, Stream::GuideLight, subpath >> 32).member(subpath as u32);
             let (light, u) = from_light::start(world, None, &sampler)?;
             Some((light, u, score))
         });

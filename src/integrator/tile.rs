@@ -2,7 +2,7 @@
 
 use super::spread::{Adaptive, PixelPlan, PixelSums, Seen};
 use crate::film::Film;
-use crate::sampler::{Purpose, Sampler, Stream};
+use crate::sampler::{Family, Purpose, Sampler, Stream};
 use crate::tally::{Clock, Tally};
 use glam::DVec2;
 use rayon::prelude::*;
@@ -59,12 +59,15 @@ pub(super) fn sample_film(
                             .map_or(PixelPlan { samples, share: 1.0 }, |plans| plans.pixel(x, y, samples));
                         // A pixel of fewer or more samples than it counts.
                         let scale = f64::from(samples) / f64::from(plan.samples);
+                        let offset =
+                            if plan.share < 1.0 { pixel_offset(seed, iteration, pixel) } else { 0.0 };
+                        let family = Family::new(seed, iteration, Stream::Eye, pixel);
                         let mut sums = PixelSums::default();
                         let values = (0..plan.samples).map(|n| {
                             let index = pixel * u64::from(samples) + u64::from(n);
-                            let sampler = Sampler::in_family(seed, iteration, Stream::Eye, pixel, n);
+                            let sampler = family.member(n);
                             let raster = DVec2::new(x.into(), y.into()) + sampler.u2(0, Purpose::Raster);
-                            let plays = plan.plays(n, pixel_offset(seed, iteration, pixel));
+                            let plays = plan.plays(n, offset);
                             let sample = Sample { raster, index, sampler, plays };
                             let seen = radiance(&sample, clock, &mut tally);
                             if plans.is_some() {

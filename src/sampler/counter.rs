@@ -82,6 +82,26 @@ impl Purpose {
 /// Depths up to this one have their numbers spread evenly over a family. Deeper, too little depends on one number alone.
 const EVEN_DEPTHS: u32 = 3;
 
+/// Subpaths whose numbers are spread evenly over them all: the samples of a pixel, the light subpaths of an iteration.
+/// Those that choose positions, directions and lights near a subpath's start are points of one sequence
+/// ([`super::sobol`]), which lowers the family's noise; each subpath's own are as uniform and independent as ever.
+#[derive(Debug, Clone, Copy)]
+pub struct Family(u64);
+
+impl Family {
+    /// A family of a stream in an iteration.
+    #[inline]
+    pub fn new(seed: u64, iteration: u64, stream: Stream, family: u64) -> Self {
+        Self(combine(combine(combine(seed, iteration), stream as u64), family))
+    }
+
+    /// The numbers of one of its subpaths.
+    #[inline(always)]
+    pub fn member(self, index: u32) -> Sampler {
+        Sampler { key: combine(self.0, !u64::from(index)), family: Some((self.0, Place::new(index))) }
+    }
+}
+
 /// The random numbers of one subpath.
 #[derive(Debug, Clone, Copy)]
 pub struct Sampler {
@@ -94,15 +114,6 @@ impl Sampler {
     /// Independent numbers for the subpath `index` of a stream in an iteration.
     pub fn new(seed: u64, iteration: u64, stream: Stream, index: u64) -> Self {
         Self { key: combine(combine(combine(seed, iteration), stream as u64), index), family: None }
-    }
-
-    /// Numbers for the subpath `index` of a family (the samples of a pixel, the light subpaths of an iteration): those
-    /// that choose positions, directions and lights near its start are spread evenly over the family ([`super::sobol`]), which
-    /// lowers its noise; each subpath's own are as uniform and independent as ever.
-    #[inline]
-    pub fn in_family(seed: u64, iteration: u64, stream: Stream, family: u64, index: u32) -> Self {
-        let family = combine(combine(combine(seed, iteration), stream as u64), family);
-        Self { key: combine(family, !u64::from(index)), family: Some((family, Place::new(index))) }
     }
 
     /// 64 random bits for a purpose at a depth (vertex number along the subpath).
@@ -177,7 +188,7 @@ mod tests {
             let hit = |family: u64| {
                 let mut seen = [false; 64];
                 for index in 0..64 {
-                    let u = Sampler::in_family(3, 1, Stream::Eye, family, index).u2(depth, purpose);
+                    let u = Family::new(3, 1, Stream::Eye, family).member(index).u2(depth, purpose);
                     seen[(u.x * 8.0) as usize * 8 + (u.y * 8.0) as usize] = true;
                 }
                 seen.iter().filter(|&&s| s).count()

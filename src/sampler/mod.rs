@@ -3,4 +3,4 @@
 pub mod counter;
 pub mod sobol;
 
-pub use counter::{Purpose, Sampler, Stream};
+pub use counter::{Family, Purpose, Sampler, Stream};
