@@ -3,34 +3,22 @@
 use super::merging;
 use super::recipe::{Base, Recipe};
 use super::records::Records;
-use super::spread::{Adaptive, Seen};
-use super::tile::{self, Sample};
+use super::spread::Adaptive;
+use super::tile;
 use super::{Integrator, Size};
-use crate::connect::{self, EyeVertex, Onward};
 use crate::error::Result;
 use crate::film::Film;
 use crate::light_cache::LightCache;
 use crate::material::Material;
-use crate::math::Spectrum;
-use crate::roulette::{self, Query};
-use crate::sampler::{Family, Purpose, Sampler, Stream};
+use crate::sampler::Stream;
 use crate::settings::{Settings, Switch};
-use crate::subpath::{Origin, Storing, Walk, World};
-use crate::tally::{Clock, Tally};
+use crate::subpath::{Origin, Storing, World};
+use crate::tally::Tally;
 use crate::techniques::{Merging, Roulette, Techniques};
 use crate::vertex_bvh::VertexBvh;
-use crate::visibility::Ray;
 use glam::DVec2;
-use rayon::prelude::*;
-use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Instant;
 
-/// Light subpaths traced by one task.
-const CHUNK: u64 = 1024;
-/// Light subpaths of the pre-pass that estimates how many vertices one leaves.
-const PILOT: u64 = 16 * CHUNK;
-/// Light subpaths whose vertices all are kept for uniform picks: enough for eye samples not to share many.
-const PICKED: u64 = 256 * CHUNK;
 /// Share of an iteration's progress that the light side stands for.
 const LIGHT_SHARE: f64 = 0.3;
 
@@ -38,7 +26,7 @@ const LIGHT_SHARE: f64 = 0.3;
 pub struct Bidirectional<'a> {
     pub(super) world: &'a World<'a>,
     pub(super) settings: &'a Settings,
-    recipe: Recipe,
+    pub(super) recipe: Recipe,
     pub(super) techniques: Techniques,
     pub(super) size: Size,
     /// Light subpaths that the emission guide was learned from; 0 before.
@@ -48,9 +36,9 @@ pub struct Bidirectional<'a> {
     /// Light vertices for the roulette and for merging.
     pub(super) cache: LightCache,
     /// All vertices of the first light subpaths, for uniform picks, where `cache` has not got them all.
-    picks: LightCache,
+    pub(super) picks: LightCache,
     pub(super) bvh: VertexBvh,
-    records: Records,
+    pub(super) records: Records,
     adaptive: Option<Adaptive>,
 }
 
@@ -123,276 +111,6 @@ impl<'a> Bidirectional<'a> {
                 max_alpha: self.settings.hrr_alpha,
             }),
         };
-    }
-
-    /// How many vertices a light subpath leaves in the roulette's cache, and in that for uniform picks.
-    fn vertices_per_subpath(&self) -> [f64; 2] {
-        if !self.keeps_vertices() {
-            return [0.0; 2];
-        }
-        let caches: Vec<[LightCache; 2]> = (0..PILOT / CHUNK)
-            .into_par_iter()
-            .map(|chunk| self.trace_light(Stream::Pilot, 0, chunk * CHUNK..(chunk + 1) * CHUNK, None).0)
-            .collect();
-        let mean = |which: usize| caches.iter().map(|c| c[which].len()).sum::<usize>() as f64 / PILOT as f64;
-        [mean(0), if self.picks_apart() { mean(1) } else { mean(0) }]
-    }
-
-    fn keeps_vertices(&self) -> bool {
-        self.recipe.base != Base::Off || self.recipe.roulette || self.recipe.merging
-    }
-
-    /// Whether the cache has all light vertices, for want of any other use than picks.
-    fn stores_all(&self) -> bool {
-        !self.recipe.roulette && !self.recipe.merging
-    }
-
-    /// Whether uniform picks have a cache of their own.
-    fn picks_apart(&self) -> bool {
-        !self.stores_all() && matches!(self.recipe.base, Base::Uniform | Base::Probabilistic)
-    }
-
-    /// The light vertices to pick from where the roulette is off, and how many subpaths left them.
-    pub(super) fn picks(&self) -> (&LightCache, u64) {
-        if self.picks_apart() {
-            (&self.picks, self.size.light_subpaths.min(PICKED))
-        } else {
-            (&self.cache, self.size.light_subpaths)
-        }
-    }
-
-    /// Traces light subpaths, storing their vertices and connecting them to the camera. Gives the roulette's cache and
-    /// that for uniform picks.
-    fn trace_light(
-        &self,
-        stream: Stream,
-        iteration: u64,
-        subpaths: std::ops::Range<u64>,
-        film: Option<&Film>,
-    ) -> ([LightCache; 2], Tally) {
-        let (world, start) = (self.world, Instant::now());
-        // A path has one segment more when it is connected than when it is merged.
-        let more = if self.recipe.merging { 1 } else { 2 };
-        let mut tally = Tally { light_subpaths: subpaths.end - subpaths.start, ..Tally::default() };
-        let [mut cache, mut picks] = [(); 2].map(|()| LightCache::default());
-        for index in subpaths {
-            let sampler =
-                Family::new(self.settings.seed, iteration, stream, index >> 32).member(index as u32);
-            let picked = self.picks_apart() && index < PICKED;
-            let mut walk = self.techniques.emit(world, &sampler);
-            while let Some(light) = walk.filter(|light| light.depth < self.settings.max_depth) {
-                if !light.vertex.bsdf.is_delta() {
-                    if self.keeps_vertices() && light.depth + more <= self.settings.max_depth {
-                        let stored = if self.stores_all() { 1.0 } else { self.techniques.stored(&light) };
-                        if stored == 1.0 || sampler.u1(light.depth, Purpose::Storing) < stored {
-                            cache.push(&light);
-                        }
-                        if picked {
-                            picks.push(&light);
-                        }
-                    }
-                    if let Some(film) = film.filter(|_| self.recipe.light_image)
-                        && let Some((raster, value, ray)) =
-                            connect::connect_camera(world, &self.techniques, &light, &sampler)
-                        && tally.connection(!world.visibility.occluded(&ray))
-                    {
-                        film.add(raster, value);
-                    }
-                }
-                walk = self.techniques.next_light(world, &light, &sampler);
-            }
-            cache.end_subpath();
-            if picked {
-                picks.end_subpath();
-            }
-        }
-        tally.light_vertices = cache.len() as u64;
-        tally.light_trace = start.elapsed().as_secs_f64();
-        ([cache, picks], tally)
-    }
-
-    /// The light pass of an iteration: fills the caches, in the order of the subpaths.
-    pub(super) fn light_pass(
-        &mut self,
-        stream: Stream,
-        iteration: u64,
-        film: Option<&Film>,
-        progress: &(dyn Fn(f64) + Sync),
-    ) -> Tally {
-        let (done, all) = (AtomicU64::new(0), self.size.light_subpaths);
-        let parts: Vec<([LightCache; 2], Tally)> = (0..all.div_ceil(CHUNK))
-            .into_par_iter()
-            .map(|chunk| {
-                let range = chunk * CHUNK..((chunk + 1) * CHUNK).min(all);
-                let part = self.trace_light(stream, iteration, range, film);
-                let traced = done.fetch_add(part.1.light_subpaths, Ordering::Relaxed) + part.1.light_subpaths;
-                progress(traced as f64 / all as f64);
-                part
-            })
-            .collect();
-        self.cache.clear();
-        self.picks.clear();
-        let mut tally = Tally::default();
-        for ([cache, picks], part_tally) in &parts {
-            self.cache.append(cache);
-            self.picks.append(picks);
-            tally.add(part_tally);
-        }
-        tally
-    }
-
-    /// What an eye sample sees.
-    fn radiance(&self, sample: &Sample, clock: Clock, tally: &mut Tally) -> Seen {
-        let (world, techniques) = (self.world, &self.techniques);
-        let (mut rest, mut kept) = (Spectrum::ZERO, Spectrum::ZERO);
-        let mut eye = EyeVertex::first(world, techniques, sample.raster, &sample.sampler);
-        while let Onward::Vertex(vertex) = eye {
-            rest += vertex.emitted(world, techniques);
-            if !self.recipe.eye_subpaths || vertex.walk.depth == self.settings.max_depth {
-                break;
-            }
-            if !vertex.walk.vertex.bsdf.is_delta() {
-                rest += self.next_event(&vertex, sample, clock, tally);
-                if !vertex.lobes.is_empty() {
-                    if sample.plays > 0.0 {
-                        let sampler = &sample.sampler;
-                        self.play_roulette(&vertex, sampler, clock, tally, &mut |_, value| kept += value);
-                    }
-                } else {
-                    rest += match self.recipe.base {
-                        Base::Off => Spectrum::ZERO,
-                        Base::OwnPath => self.connect_own_path(&vertex, sample, clock, tally),
-                        Base::Uniform | Base::Probabilistic => {
-                            self.connect_picks(&vertex, sample, clock, tally)
-                        }
-                    };
-                }
-                rest += self.merge(&vertex, tally);
-            }
-            eye = vertex.next(world, techniques, &sample.sampler);
-        }
-        if let Onward::Sky(light) = eye {
-            rest += light;
-        }
-        let roulette = kept * sample.plays;
-        Seen { radiance: rest + roulette, roulette }
-    }
-
-    /// Counts a connection's value if its ray is free.
-    fn if_visible(&self, connection: Option<(Spectrum, Ray)>, clock: Clock, tally: &mut Tally) -> Spectrum {
-        let Some((value, ray)) = connection else { return Spectrum::ZERO };
-        let free = clock.time(&mut tally.visibility, || !self.world.visibility.occluded(&ray));
-        if tally.connection(free) { value } else { Spectrum::ZERO }
-    }
-
-    fn next_event(&self, vertex: &EyeVertex, sample: &Sample, clock: Clock, tally: &mut Tally) -> Spectrum {
-        self.if_visible(vertex.next_event(self.world, &self.techniques, &sample.sampler), clock, tally)
-    }
-
-    /// Connections to the sample's own light subpath.
-    fn connect_own_path(
-        &self,
-        vertex: &EyeVertex,
-        sample: &Sample,
-        clock: Clock,
-        tally: &mut Tally,
-    ) -> Spectrum {
-        let lights = self.cache.subpath(sample.index as usize);
-        lights
-            .map(|index| self.connect_base(vertex, &self.cache.load(self.world, index), 1.0, clock, tally))
-            .sum()
-    }
-
-    /// Connections to picks from the cache.
-    fn connect_picks(
-        &self,
-        vertex: &EyeVertex,
-        sample: &Sample,
-        clock: Clock,
-        tally: &mut Tally,
-    ) -> Spectrum {
-        let ((cache, subpaths), depth) = (self.picks(), vertex.walk.depth);
-        let stored = cache.len();
-        let picks = f64::from(self.settings.connections);
-        let mut sum = Spectrum::ZERO;
-        for n in 0..self.settings.connections {
-            let u = sample.sampler.nth(depth, Purpose::CachePick, n);
-            if self.recipe.base == Base::Probabilistic {
-                let kind = sample.sampler.nth(depth, Purpose::RecordPick, n);
-                if let Some((light, probability)) =
-                    self.records.pick(vertex.walk.vertex.point.position, kind, u)
-                {
-                    let reused = self.settings.reused_subpaths.min(subpaths) as f64;
-                    sum += self.connect_base(vertex, light, picks * reused * probability, clock, tally);
-                }
-            } else if stored > 0 {
-                let light = cache.load(self.world, ((u * stored as f64) as usize).min(stored - 1));
-                let tries = picks * subpaths as f64 / stored as f64;
-                sum += self.connect_base(vertex, &light, tries, clock, tally);
-            }
-        }
-        sum
-    }
-
-    /// A connection where the roulette is off, tried as often as `tries` says.
-    fn connect_base(
-        &self,
-        vertex: &EyeVertex,
-        light: &Walk,
-        tries: f64,
-        clock: Clock,
-        tally: &mut Tally,
-    ) -> Spectrum {
-        if vertex.walk.depth + 1 + light.depth > self.settings.max_depth {
-            return Spectrum::ZERO;
-        }
-        let connection = vertex.connect(&self.techniques, light, self.techniques.base, tries);
-        self.if_visible(connection, clock, tally)
-    }
-
-    /// Merging with all light vertices within the radius.
-    fn merge(&self, vertex: &EyeVertex, tally: &mut Tally) -> Spectrum {
-        let Some(merging) = &self.techniques.merging else { return Spectrum::ZERO };
-        let (depth, position) = (vertex.walk.depth, vertex.walk.vertex.point.position);
-        let mut sum = Spectrum::ZERO;
-        self.bvh.within(position, merging.radius, &mut |index| {
-            if depth + self.cache.depth(index as usize) <= self.settings.max_depth {
-                let light = self.cache.load(self.world, index as usize);
-                sum += vertex.merge(&self.techniques, merging, &light);
-                tally.merged += 1;
-            }
-        });
-        sum
-    }
-
-    /// Connections to what the roulette keeps of all light vertices: visits each that counts, with its value.
-    pub(super) fn play_roulette(
-        &self,
-        vertex: &EyeVertex,
-        sampler: &Sampler,
-        clock: Clock,
-        tally: &mut Tally,
-        visit: &mut impl FnMut(u32, Spectrum),
-    ) {
-        let Some(roulette) = &self.techniques.roulette else { return };
-        let depth = vertex.walk.depth;
-        let position = vertex.walk.vertex.point.position;
-        let key = sampler.bits(depth, Purpose::Roulette);
-        let query = Query::new(position, &vertex.lobes, roulette.constant, key);
-        let mut kept = Vec::new();
-        let Tally { roulette: counters, roulette_seconds, .. } = tally;
-        clock.time(roulette_seconds, || {
-            roulette::query(&self.bvh, &query, counters, &mut |index, p| kept.push((index, p)));
-        });
-        for (index, p) in kept {
-            if depth + 1 + self.cache.depth(index as usize) <= self.settings.max_depth {
-                let light = self.cache.load(self.world, index as usize);
-                let p = p * self.techniques.stored(&light);
-                let (m, tries) = (roulette.light_subpaths * p, self.size.light_subpaths as f64 * p);
-                let connection = vertex.connect(&self.techniques, &light, m, tries);
-                visit(index, self.if_visible(connection, clock, tally));
-            }
-        }
     }
 }
 

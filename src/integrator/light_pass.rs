@@ -1,0 +1,136 @@
+//! The light pass: light subpaths, the caches that they fill, and what of them the camera sees.
+
+use super::bidirectional::Bidirectional;
+use super::recipe::Base;
+use crate::connect;
+use crate::film::Film;
+use crate::light_cache::LightCache;
+use crate::sampler::{Family, Purpose, Stream};
+use crate::tally::Tally;
+use rayon::prelude::*;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::time::Instant;
+
+/// Light subpaths traced by one task.
+const CHUNK: u64 = 1024;
+/// Light subpaths of the pre-pass that estimates how many vertices one leaves.
+const PILOT: u64 = 16 * CHUNK;
+/// Light subpaths whose vertices all are kept for uniform picks: enough for eye samples not to share many.
+const PICKED: u64 = 256 * CHUNK;
+impl Bidirectional<'_> {
+    /// How many vertices a light subpath leaves in the roulette's cache, and in that for uniform picks.
+    pub(super) fn vertices_per_subpath(&self) -> [f64; 2] {
+        if !self.keeps_vertices() {
+            return [0.0; 2];
+        }
+        let caches: Vec<[LightCache; 2]> = (0..PILOT / CHUNK)
+            .into_par_iter()
+            .map(|chunk| self.trace_light(Stream::Pilot, 0, chunk * CHUNK..(chunk + 1) * CHUNK, None).0)
+            .collect();
+        let mean = |which: usize| caches.iter().map(|c| c[which].len()).sum::<usize>() as f64 / PILOT as f64;
+        [mean(0), if self.picks_apart() { mean(1) } else { mean(0) }]
+    }
+
+    fn keeps_vertices(&self) -> bool {
+        self.recipe.base != Base::Off || self.recipe.roulette || self.recipe.merging
+    }
+
+    /// Whether the cache has all light vertices, for want of any other use than picks.
+    fn stores_all(&self) -> bool {
+        !self.recipe.roulette && !self.recipe.merging
+    }
+
+    /// Whether uniform picks have a cache of their own.
+    fn picks_apart(&self) -> bool {
+        !self.stores_all() && matches!(self.recipe.base, Base::Uniform | Base::Probabilistic)
+    }
+
+    /// The light vertices to pick from where the roulette is off, and how many subpaths left them.
+    pub(super) fn picks(&self) -> (&LightCache, u64) {
+        if self.picks_apart() {
+            (&self.picks, self.size.light_subpaths.min(PICKED))
+        } else {
+            (&self.cache, self.size.light_subpaths)
+        }
+    }
+
+    /// Traces light subpaths, storing their vertices and connecting them to the camera. Gives the roulette's cache and
+    /// that for uniform picks.
+    fn trace_light(
+        &self,
+        stream: Stream,
+        iteration: u64,
+        subpaths: std::ops::Range<u64>,
+        film: Option<&Film>,
+    ) -> ([LightCache; 2], Tally) {
+        let (world, start) = (self.world, Instant::now());
+        // A path has one segment more when it is connected than when it is merged.
+        let more = if self.recipe.merging { 1 } else { 2 };
+        let mut tally = Tally { light_subpaths: subpaths.end - subpaths.start, ..Tally::default() };
+        let [mut cache, mut picks] = [(); 2].map(|()| LightCache::default());
+        for index in subpaths {
+            let sampler =
+                Family::new(self.settings.seed, iteration, stream, index >> 32).member(index as u32);
+            let picked = self.picks_apart() && index < PICKED;
+            let mut walk = self.techniques.emit(world, &sampler);
+            while let Some(light) = walk.filter(|light| light.depth < self.settings.max_depth) {
+                if !light.vertex.bsdf.is_delta() {
+                    if self.keeps_vertices() && light.depth + more <= self.settings.max_depth {
+                        let stored = if self.stores_all() { 1.0 } else { self.techniques.stored(&light) };
+                        if stored == 1.0 || sampler.u1(light.depth, Purpose::Storing) < stored {
+                            cache.push(&light);
+                        }
+                        if picked {
+                            picks.push(&light);
+                        }
+                    }
+                    if let Some(film) = film.filter(|_| self.recipe.light_image)
+                        && let Some((raster, value, ray)) =
+                            connect::connect_camera(world, &self.techniques, &light, &sampler)
+                        && tally.connection(!world.visibility.occluded(&ray))
+                    {
+                        film.add(raster, value);
+                    }
+                }
+                walk = self.techniques.next_light(world, &light, &sampler);
+            }
+            cache.end_subpath();
+            if picked {
+                picks.end_subpath();
+            }
+        }
+        tally.light_vertices = cache.len() as u64;
+        tally.light_trace = start.elapsed().as_secs_f64();
+        ([cache, picks], tally)
+    }
+
+    /// The light pass of an iteration: fills the caches, in the order of the subpaths.
+    pub(super) fn light_pass(
+        &mut self,
+        stream: Stream,
+        iteration: u64,
+        film: Option<&Film>,
+        progress: &(dyn Fn(f64) + Sync),
+    ) -> Tally {
+        let (done, all) = (AtomicU64::new(0), self.size.light_subpaths);
+        let parts: Vec<([LightCache; 2], Tally)> = (0..all.div_ceil(CHUNK))
+            .into_par_iter()
+            .map(|chunk| {
+                let range = chunk * CHUNK..((chunk + 1) * CHUNK).min(all);
+                let part = self.trace_light(stream, iteration, range, film);
+                let traced = done.fetch_add(part.1.light_subpaths, Ordering::Relaxed) + part.1.light_subpaths;
+                progress(traced as f64 / all as f64);
+                part
+            })
+            .collect();
+        self.cache.clear();
+        self.picks.clear();
+        let mut tally = Tally::default();
+        for ([cache, picks], part_tally) in &parts {
+            self.cache.append(cache);
+            self.picks.append(picks);
+            tally.add(part_tally);
+        }
+        tally
+    }
+}
