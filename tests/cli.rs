@@ -267,7 +267,7 @@ fn time_is_a_budget_too() {
     let (code, out, err) = place.run("render scene.toml -o a.exr --stats - --time 0.3");
     assert_eq!(code, 0, "{err}");
     let stats: serde_json::Value = serde_json::from_str(&out).unwrap();
-    assert!(stats["iterations"].as_u64().unwrap() > 0, "{out}");
+    assert!(stats["iterations"].as_u64().unwrap() > 2, "{out}");
     // The last hundredths of the time are not worth another iteration.
     assert!(stats["seconds"]["render"].as_f64().unwrap() >= 0.29 && start.elapsed().as_secs_f64() < 20.0);
 }
