@@ -100,6 +100,11 @@ impl LightCache {
         self.starts.partition_point(|&start| start as usize <= vertex) - 1
     }
 
+    /// Number of subpaths.
+    pub fn subpaths(&self) -> u64 {
+        self.starts.len() as u64 - 1
+    }
+
     /// Number of vertices in the first `subpaths` subpaths.
     pub fn end_of(&self, subpaths: u64) -> usize {
         let last = (self.starts.len() - 1).min(usize::try_from(subpaths).unwrap_or(usize::MAX));

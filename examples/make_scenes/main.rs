@@ -4,8 +4,10 @@
 mod obj;
 mod parts;
 
+mod brushed;
 mod caustic;
 mod cornell;
+mod corridor;
 mod furnished;
 
 use std::path::Path;
@@ -20,6 +22,8 @@ pub fn files() -> Vec<File> {
         caustic::mirror(),
         caustic::mirror_aniso(),
         caustic::glass(),
+        brushed::files(),
+        corridor::files(),
         furnished::glossy(),
         furnished::specular(),
     ]

@@ -43,8 +43,7 @@ impl Obj {
         let (v, vt) = (self.vertices + 1, self.uvs + 1);
         for (p, uv) in corners.into_iter().zip([DVec2::ZERO, DVec2::X, DVec2::ONE, DVec2::Y]) {
             self.vertex(p);
-            self.uvs += 1;
-            writeln!(self.text, "vt {} {}", number(uv.x), number(uv.y)).unwrap();
+            self.uv(uv);
         }
         let corner = |i: usize| format!("{}/{}", v + i, vt + i);
         writeln!(self.text, "f {} {} {} {}", corner(0), corner(1), corner(2), corner(3)).unwrap();
@@ -102,15 +101,33 @@ impl Obj {
     /// A sheet swept along `0..=segments`: `edges` gives its two edges and its normal at each step. Seen against the
     /// normal, the first edge is below and steps go to the right.
     pub fn sheet(&mut self, segments: usize, edges: impl Fn(usize) -> (DVec3, DVec3, DVec3)) {
-        let (v, vn) = (self.vertices + 1, self.normals + 1);
+        self.sweep(segments, false, edges);
+    }
+
+    /// The same with texture coordinates: u from 0 to 1 along the steps, v from the first edge to the second.
+    pub fn sheet_with_uv(&mut self, segments: usize, edges: impl Fn(usize) -> (DVec3, DVec3, DVec3)) {
+        self.sweep(segments, true, edges);
+    }
+
+    fn sweep(&mut self, segments: usize, uv: bool, edges: impl Fn(usize) -> (DVec3, DVec3, DVec3)) {
+        let (v, vt, vn) = (self.vertices + 1, self.uvs + 1, self.normals + 1);
         for step in 0..=segments {
             let (low, high, normal) = edges(step);
             self.vertex(low);
             self.vertex(high);
             self.normal(normal);
+            if uv {
+                let u = step as f64 / segments as f64;
+                self.uv(DVec2::new(u, 0.0));
+                self.uv(DVec2::new(u, 1.0));
+            }
         }
         for s in 0..segments {
-            let corner = |step: usize, side: usize| format!("{}//{}", v + 2 * step + side, vn + step);
+            let corner = |step: usize, side: usize| {
+                let at = 2 * step + side;
+                let texture = if uv { (vt + at).to_string() } else { String::new() };
+                format!("{}/{texture}/{}", v + at, vn + step)
+            };
             let quad = [corner(s, 0), corner(s + 1, 0), corner(s + 1, 1), corner(s, 1)];
             writeln!(self.text, "f {}", quad.join(" ")).unwrap();
         }
@@ -119,6 +136,11 @@ impl Obj {
     fn vertex(&mut self, p: DVec3) {
         self.vertices += 1;
         writeln!(self.text, "v {} {} {}", number(p.x), number(p.y), number(p.z)).unwrap();
+    }
+
+    fn uv(&mut self, uv: DVec2) {
+        self.uvs += 1;
+        writeln!(self.text, "vt {} {}", number(uv.x), number(uv.y)).unwrap();
     }
 
     fn normal(&mut self, n: DVec3) {

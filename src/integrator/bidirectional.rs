@@ -4,7 +4,6 @@ use super::merging;
 use super::recipe::{Base, Recipe};
 use super::records::Records;
 use super::spread::Adaptive;
-use super::tile;
 use super::{Integrator, Size};
 use crate::error::Result;
 use crate::film::Film;
@@ -39,7 +38,7 @@ pub struct Bidirectional<'a> {
     pub(super) picks: LightCache,
     pub(super) bvh: VertexBvh,
     pub(super) records: Records,
-    adaptive: Option<Adaptive>,
+    pub(super) adaptive: Option<Adaptive>,
 }
 
 impl<'a> Bidirectional<'a> {
@@ -152,19 +151,10 @@ impl Integrator for Bidirectional<'_> {
             self.bvh.build(self.cache.positions())?;
             tally.vertex_bvh_build += build.elapsed().as_secs_f64();
         }
-        if self.recipe.base == Base::Probabilistic {
-            let (world, cache) = (self.world, self.picks().0);
-            self.records = Records::new(world, self.settings, &self.techniques, cache, iteration, &mut tally);
-        }
         tally.sides[0] = start.elapsed().as_secs_f64();
-        let (start, key) = (Instant::now(), (self.settings.seed, iteration, self.size.samples));
+        let start = Instant::now();
         let on_eye_side = |fraction| progress(LIGHT_SHARE + (1.0 - LIGHT_SHARE) * fraction);
-        // Set aside, since the samples look at the rest of the machine.
-        let mut adaptive = self.adaptive.take();
-        tally.add(&tile::sample_film(film, key, adaptive.as_mut(), &on_eye_side, |sample, clock, tally| {
-            self.radiance(sample, clock, tally)
-        }));
-        self.adaptive = adaptive;
+        self.eye_pass(iteration, film, &on_eye_side, &mut tally);
         tally.sides[1] = start.elapsed().as_secs_f64();
         film.count_samples(u64::from(self.size.samples));
         Ok(tally)

@@ -2,9 +2,11 @@
 
 use super::bidirectional::Bidirectional;
 use super::recipe::Base;
+use super::records::{self, Records};
 use super::spread::Seen;
-use super::tile::Sample;
+use super::tile::{self, Part, Sample};
 use crate::connect::{EyeVertex, Onward};
+use crate::film::Film;
 use crate::math::Spectrum;
 use crate::roulette::{self, Query};
 use crate::sampler::{Purpose, Sampler};
@@ -13,6 +15,34 @@ use crate::tally::{Clock, Tally};
 use crate::visibility::Ray;
 
 impl Bidirectional<'_> {
+    /// The eye pass of an iteration, and what it needs to know of the light pass before.
+    pub(super) fn eye_pass(
+        &mut self,
+        iteration: u64,
+        film: &Film,
+        progress: &(dyn Fn(f64) + Sync),
+        tally: &mut Tally,
+    ) {
+        let key = (self.settings.seed, iteration, self.size.samples);
+        let records = self.recipe.base == Base::Probabilistic;
+        let of = if records { self.size.samples.div_ceil(records::SAMPLES) } else { 1 };
+        // Set aside, since the samples look at the rest of the machine.
+        let mut adaptive = self.adaptive.take();
+        for index in 0..of {
+            if records {
+                let cache = self.picks().0;
+                let part = (iteration, index);
+                self.records = Records::new(self.world, self.settings, &self.techniques, cache, part, tally);
+            }
+            let on_part = |fraction: f64| progress((f64::from(index) + fraction) / f64::from(of));
+            let part = Part { index, of };
+            tally.add(&tile::sample_film(film, key, part, adaptive.as_mut(), &on_part, |sample, clock, tally| {
+                self.radiance(sample, clock, tally)
+            }));
+        }
+        self.adaptive = adaptive;
+    }
+
     /// What an eye sample sees.
     pub(super) fn radiance(&self, sample: &Sample, clock: Clock, tally: &mut Tally) -> Seen {
         let (world, techniques) = (self.world, &self.techniques);
@@ -91,11 +121,8 @@ impl Bidirectional<'_> {
             let u = sample.sampler.nth(depth, Purpose::CachePick, n);
             if self.recipe.base == Base::Probabilistic {
                 let kind = sample.sampler.nth(depth, Purpose::RecordPick, n);
-                if let Some((light, probability)) =
-                    self.records.pick(vertex.walk.vertex.point.position, kind, u)
-                {
-                    let reused = self.settings.reused_subpaths.min(subpaths) as f64;
-                    sum += self.connect_base(vertex, light, picks * reused * probability, clock, tally);
+                if let Some((light, tries)) = self.records.pick(vertex.walk.vertex.point.position, kind, u) {
+                    sum += self.connect_base(vertex, light, picks * tries, clock, tally);
                 }
             } else if stored > 0 {
                 let light = cache.load(self.world, ((u * stored as f64) as usize).min(stored - 1));

@@ -2,7 +2,7 @@
 //! machine.
 
 use super::spread::Adaptive;
-use super::tile::{self, Sample};
+use super::tile::{self, Part, Sample};
 use super::{Integrator, Size};
 use crate::bsdf::Transport;
 use crate::error::Result;
@@ -138,11 +138,11 @@ impl Integrator for PathTracer<'_> {
         let mut adaptive = self.adaptive.take();
         let spread = adaptive.as_mut();
         let mut tally = if self.world.lights.only_area() {
-            tile::sample_film(film, key, spread, progress, |sample, clock, tally| {
+            tile::sample_film(film, key, Part::ALL, spread, progress, |sample, clock, tally| {
                 self.radiance::<false>(sample, clock, tally).into()
             })
         } else {
-            tile::sample_film(film, key, spread, progress, |sample, clock, tally| {
+            tile::sample_film(film, key, Part::ALL, spread, progress, |sample, clock, tally| {
                 self.radiance::<true>(sample, clock, tally).into()
             })
         };

@@ -4,6 +4,7 @@
 //! A *record* is an eye vertex, one of some spread over the image, for which the full contribution of every reused light
 //! vertex is computed, both BSDFs, the geometry, the weight and a shadow ray included. An eye vertex picks from the mean
 //! of its nearest records' distributions, and now and then uniformly, which keeps it unbiased wherever they are wrong.
+//! So few light subpaths serve few eye samples well: in a large iteration, records are made again from others.
 //!
 //! Memory: 4 bytes for each pair of a record and a reused light vertex, some 1.5 vertices a subpath; time: a shadow ray
 //! for each pair.
@@ -26,12 +27,17 @@ use rstar::primitives::GeomWithData;
 const NEAREST: usize = 3;
 /// Share of picks that are uniform.
 const UNIFORM: f64 = 0.2;
+/// Samples of a pixel that share their reused light subpaths. What they have in common does not average out between
+/// them; with fewer, records take most of the time.
+pub(super) const SAMPLES: u32 = 8;
 
 /// The records of one iteration.
 #[derive(Debug, Default)]
 pub(super) struct Records {
-    /// The reused light vertices, ready to be connected to: the first ones of the cache.
+    /// The reused light vertices, ready to be connected to.
     lights: Vec<Walk>,
+    /// How many subpaths left them.
+    subpaths: u64,
     /// Where the records are, with their numbers.
     places: RTree<GeomWithData<[f64; 3], usize>>,
     /// Running sums of each record's distribution, record by record; the last of each is 1.
@@ -45,17 +51,19 @@ struct Record {
 }
 
 impl Records {
-    /// Makes the records of an iteration from the light vertices of the cache's first subpaths.
+    /// Makes the records of an iteration's `part`, which has its own of the cache's subpaths as long as there are enough.
     pub(super) fn new(
         world: &World<'_>,
         settings: &Settings,
         techniques: &Techniques,
         cache: &LightCache,
-        iteration: u64,
+        (iteration, part): (u64, u32),
         tally: &mut Tally,
     ) -> Self {
-        let reused = cache.end_of(settings.reused_subpaths);
-        let lights: Vec<Walk> = (0..reused).map(|index| cache.load(world, index)).collect();
+        let subpaths = settings.reused_subpaths.min(cache.subpaths());
+        let first = u64::from(part) % (cache.subpaths() / subpaths.max(1)).max(1) * subpaths;
+        let reused = cache.end_of(first)..cache.end_of(first + subpaths);
+        let lights: Vec<Walk> = reused.map(|index| cache.load(world, index)).collect();
         if lights.is_empty() {
             return Self::default();
         }
@@ -65,7 +73,8 @@ impl Records {
         let (records, rays): (Vec<Vec<Record>>, Vec<u64>) = (0..across * down)
             .into_par_iter()
             .map(|cell| {
-                let sampler = Sampler::new(settings.seed, iteration, Stream::Records, cell.into());
+                let index = u64::from(part) * u64::from(across * down) + u64::from(cell);
+                let sampler = Sampler::new(settings.seed, iteration, Stream::Records, index);
                 let corner = DVec2::new((cell % across).into(), (cell / across).into());
                 let raster = (corner + sampler.u2(0, Purpose::Raster)) * f64::from(spacing);
                 let size = DVec2::new(width.into(), height.into());
@@ -85,11 +94,12 @@ impl Records {
             // Whatever the roundings, every number in [0,1) falls on a vertex.
             *cdfs.last_mut().expect("there are lights") = 1.0;
         }
-        Self { lights, places: RTree::bulk_load(places), cdfs }
+        Self { lights, subpaths, places: RTree::bulk_load(places), cdfs }
     }
 
-    /// Picks a light vertex for an eye vertex at `position`, with the probability of that: `kind` chooses the
-    /// distribution, `u` the vertex, both uniform in [0,1). `None` when there is no light vertex.
+    /// Picks a light vertex for an eye vertex at `position`, with the expected number of picks of a vertex like it for each
+    /// light subpath: `kind` chooses the distribution, `u` the vertex, both uniform in 0 <= u < 1. `None` when there is no
+    /// light vertex.
     pub(super) fn pick(&self, position: DVec3, kind: f64, u: f64) -> Option<(&Walk, f64)> {
         let n = self.lights.len();
         if n == 0 {
@@ -110,7 +120,7 @@ impl Records {
         };
         let sum_of_records: f64 = nearest[..found].iter().map(|cdf| probability(cdf, index)).sum();
         let probability = uniform / n as f64 + (1.0 - uniform) * sum_of_records / found.max(1) as f64;
-        Some((&self.lights[index], probability))
+        Some((&self.lights[index], self.subpaths as f64 * probability))
     }
 
     /// Bytes of all records and light vertices.

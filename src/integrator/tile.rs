@@ -31,11 +31,32 @@ pub struct Sample {
     pub plays: f64,
 }
 
-/// Takes samples of every pixel of a film, `samples` or what `adaptive` says, and adds what `radiance` makes of them. The
-/// time less what `radiance` itself puts into `roulette_seconds` and `visibility` is `eye_trace`.
+/// One of the equal parts that an iteration's eye samples are taken in.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Part {
+    /// Its number.
+    pub index: u32,
+    /// How many there are.
+    pub of: u32,
+}
+
+impl Part {
+    /// All samples at once.
+    pub const ALL: Self = Self { index: 0, of: 1 };
+
+    /// Which of a pixel's samples belong to it.
+    fn range(&self, samples: u32) -> std::ops::Range<u32> {
+        let bound = |index: u32| (u64::from(samples) * u64::from(index) / u64::from(self.of)) as u32;
+        bound(self.index)..bound(self.index + 1)
+    }
+}
+
+/// Takes a part of the samples of every pixel of a film, `samples` or what `adaptive` says, and adds what `radiance` makes
+/// of them. The time less what `radiance` itself puts into `roulette_seconds` and `visibility` is `eye_trace`.
 pub(super) fn sample_film(
     film: &Film,
     (seed, iteration, samples): (u64, u64, u32),
+    part: Part,
     adaptive: Option<&mut Adaptive>,
     progress: &(dyn Fn(f64) + Sync),
     radiance: impl Fn(&Sample, Clock, &mut Tally) -> Seen + Sync,
@@ -63,7 +84,9 @@ pub(super) fn sample_film(
                             if plan.share < 1.0 { pixel_offset(seed, iteration, pixel) } else { 0.0 };
                         let family = Family::new(seed, iteration, Stream::Eye, pixel);
                         let mut sums = PixelSums::default();
-                        let values = (0..plan.samples).map(|n| {
+                        let taken = part.range(plan.samples);
+                        tally.camera_rays += taken.len() as u64;
+                        let values = taken.map(|n| {
                             let index = pixel * u64::from(samples) + u64::from(n);
                             let sampler = family.member(n);
                             let raster = DVec2::new(x.into(), y.into()) + sampler.u2(0, Purpose::Raster);
@@ -76,7 +99,6 @@ pub(super) fn sample_film(
                             (raster, seen.radiance * scale)
                         });
                         film.add_samples(x, y, values);
-                        tally.camera_rays += u64::from(plan.samples);
                         if plans.is_some() {
                             watched.push((x, y, sums));
                         }

@@ -8,7 +8,7 @@
 
 use super::counters::machine_bytes;
 use crate::film::FilmSettings;
-use crate::integrator::{Recipe, Size, recipe::Base};
+use crate::integrator::{Recipe, Size};
 use crate::settings::Settings;
 use crate::tally::Tally;
 
@@ -21,8 +21,6 @@ const LIGHT: f64 = 0.3;
 const REST: f64 = 0.02;
 /// Where only the number of samples is open, iterations to divide the time into: so that there is something to show.
 const PARTS: f64 = 8.0;
-/// Samples up to which probabilistic connections, whose light subpaths are few, stay useful in one iteration.
-const REUSED_SAMPLES: f64 = 8.0;
 /// What a cache takes while it is filled, over what it takes then.
 const WHILE_FILLING: f64 = 2.0;
 
@@ -40,7 +38,6 @@ pub(super) struct Sizing {
     open: Open,
     /// Whether noise falls with the product of both sides.
     pairs: bool,
-    most_samples: f64,
     time: f64,
     memory: f64,
     light_subpaths_per_sample: f64,
@@ -76,12 +73,10 @@ impl Sizing {
             (_, 0, true) => Open::LightSubpaths,
             _ => return None,
         };
-        let reused = recipe.is_some_and(|r| r.base == Base::Probabilistic);
         let bytes = if settings.memory > 0.0 { settings.memory * 1e9 } else { machine_bytes() as f64 / 2.0 };
         Some(Self {
             open,
             pairs,
-            most_samples: if reused { REUSED_SAMPLES } else { 65535.0 },
             time,
             memory: bytes,
             light_subpaths_per_sample: f64::from(film.width) * f64::from(film.height),
@@ -109,7 +104,6 @@ impl Sizing {
         let per_sample = (eye / f64::from(last.size.samples)).max(1e-9);
         let size = match self.open {
             Open::Both => {
-                let seconds = seconds.min(self.most_samples * per_sample / (1.0 - LIGHT));
                 let subpaths =
                     self.most_subpaths(last).min(LIGHT * seconds / per_subpath.max(1e-12)).max(1.0);
                 // In the same proportion where memory is short.
@@ -144,7 +138,7 @@ impl Sizing {
     }
 
     fn size(&self, samples: f64, subpaths: f64) -> Size {
-        let samples = samples.round().clamp(1.0, self.most_samples) as u32;
+        let samples = samples.round().clamp(1.0, 65535.0) as u32;
         Size { samples, light_subpaths: (subpaths as u64).max(1) }
     }
 

@@ -1,0 +1,118 @@
+//! What is compared: recipes, and the scenes that they are run on.
+
+use hrr::material::{Material, Scattering};
+use hrr::scene::Scene;
+use hrr::settings::{Integrator, Settings};
+use hrr::subpath::World;
+use std::path::Path;
+
+/// A name and what it sets.
+pub struct Recipe {
+    pub name: &'static str,
+    pub set: fn(Settings) -> Settings,
+}
+
+/// A scene, perhaps changed.
+pub struct Variant {
+    pub name: String,
+    pub scene: Scene,
+    /// Pixels of special interest, by their index.
+    pub region: Vec<usize>,
+    /// What makes the reference; without one, errors are told from how runs differ.
+    pub referee: Option<Recipe>,
+}
+
+const PCBPT: Recipe =
+    Recipe { name: "pcbpt", set: |s| Settings { integrator: Integrator::Pcbpt, ..s } };
+const PCBPT_HRR: Recipe =
+    Recipe { name: "pcbpt+hrr", set: |s| Settings { integrator: Integrator::PcbptHrr, ..s } };
+const LVC: Recipe = Recipe { name: "lvc", set: |s| Settings { integrator: Integrator::Lvc, ..s } };
+const LVC_HRR: Recipe =
+    Recipe { name: "lvc+hrr", set: |s| Settings { integrator: Integrator::LvcHrr, ..s } };
+const PCVCM: Recipe = Recipe { name: "pcvcm", set: |s| Settings { integrator: Integrator::Pcvcm, ..s } };
+const PCVCM_HRR: Recipe =
+    Recipe { name: "pcvcm+hrr", set: |s| Settings { integrator: Integrator::PcvcmHrr, ..s } };
+
+/// The scenes and recipes of a study.
+pub fn of(study: &str, size: [u32; 2]) -> Option<(Vec<Variant>, Vec<Recipe>)> {
+    let load = |name: &str| load(name, size);
+    Some(match study {
+        // Caustics reflected in a mirror of roughness 1e-4.
+        "mirror" => (vec![judged(load("caustic_mirror"), "mirror")], vec![PCBPT, PCBPT_HRR]),
+        // Caustics reflected in brushed metal of roughness 1e-4 and 1e-2.
+        "brushed" => {
+            (vec![judged(load("brushed_funnel"), "steel")], vec![PCBPT, PCBPT_HRR])
+        }
+        // What the roulette costs beside merging.
+        "merging" => (vec![variant(load("mirror_room"), "mirror")], vec![PCVCM, PCVCM_HRR]),
+        // Where the roulette has little to gain, or nothing.
+        "graceful" => (graceful(size), vec![LVC, LVC_HRR]),
+        _ => return None,
+    })
+}
+
+fn graceful(size: [u32; 2]) -> Vec<Variant> {
+    let plain = ["cornell", "caustic_mirror", "caustic_mirror_aniso", "glass_caustic", "mirror_room", "brushed_funnel",
+        "glossy_corridor"];
+    let mut variants: Vec<Variant> = plain.iter().map(|name| variant(load(name, size), "mirror")).collect();
+    let mut change = |name: &str, scene: &str, change: fn(&mut Scene)| {
+        let mut scene = load(scene, size);
+        change(&mut scene);
+        let name = name.to_owned();
+        variants.push(Variant { name, ..variant(scene, "") });
+    };
+    change("grazing_rough", "glossy_corridor", |scene| roughen(scene, "metal", 0.25, 0.25));
+    change("diagonal", "caustic_mirror_aniso", |scene| {
+        material(scene, "mirror").tangent_angle = std::f64::consts::FRAC_PI_4;
+    });
+    change("diagonal_rough", "brushed_funnel", |scene| {
+        roughen(scene, "steel", 0.01, 0.25);
+        material(scene, "steel").tangent_angle = std::f64::consts::FRAC_PI_4;
+    });
+    change("few_vertices", "caustic_mirror", |scene| scene.settings.light_subpaths = 2000);
+    variants
+}
+
+fn load(name: &str, size: [u32; 2]) -> Scene {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes").join(name).join("scene.toml");
+    let mut scene = Scene::load(&path, &[]).expect("a scene of the project");
+    [scene.film.width, scene.film.height] = size;
+    scene
+}
+
+fn variant(scene: Scene, material: &str) -> Variant {
+    let name = scene.path.parent().and_then(Path::file_name).map_or_else(String::new, |n| n.to_string_lossy().into());
+    Variant { name, region: pixels_of(&scene, material), scene, referee: None }
+}
+
+fn judged(scene: Scene, material: &str) -> Variant {
+    Variant { referee: Some(LVC_HRR), ..variant(scene, material) }
+}
+
+/// The pixels in whose middle a material is seen.
+fn pixels_of(scene: &Scene, material: &str) -> Vec<usize> {
+    let world = World::new(scene, &scene.settings).expect("a world");
+    let (width, height) = (scene.film.width, scene.film.height);
+    (0..width * height)
+        .filter(|i| {
+            let middle = glam::DVec2::new(f64::from(i % width), f64::from(i / width)) + 0.5;
+            let direction = world.camera.direction(middle);
+            let ray = hrr::visibility::offset::from_free_point(world.camera.position, direction);
+            world.intersect(&ray, world.camera.position, direction).is_some_and(|p| {
+                scene.materials[scene.mesh.materials[p.triangle as usize] as usize].name == material
+            })
+        })
+        .map(|i| i as usize)
+        .collect()
+}
+
+fn material<'a>(scene: &'a mut Scene, name: &str) -> &'a mut Material {
+    scene.materials.iter_mut().find(|m| m.name == name).expect("a material of that name")
+}
+
+fn roughen(scene: &mut Scene, name: &str, x: f64, y: f64) {
+    let old = material(scene, name);
+    let Scattering::Conductor { reflectance, .. } = *old.scattering() else { panic!("{name} is no metal") };
+    let new = Material::new(name, Scattering::Conductor { reflectance, alpha_x: x, alpha_y: y });
+    *old = new;
+}
