@@ -9,8 +9,8 @@ use std::f64::consts::TAU;
 
 /// Centre of the brass strip's arc, on the floor.
 const STAGE: DVec3 = dvec3(0.0, 0.0, -0.62);
-/// Centre of the lamp: beside the funnel, a little behind its front.
-const LAMP: DVec3 = dvec3(-1.05, 0.6, -1.25);
+/// Centre of the lamp, beside the funnel.
+const LAMP: DVec3 = dvec3(-1.3, 0.65, -0.9);
 /// Side of the square lamp.
 const LAMP_SIDE: f64 = 0.02;
 /// The funnel's axis, its height, and its radii below and above.
@@ -87,9 +87,10 @@ pub fn files() -> Vec<File> {
     obj.part("blue_box", "blue");
     let turned = DQuat::from_rotation_y(f64::to_radians(25.0));
     obj.cuboid(DAffine3::from_rotation_translation(turned, dvec3(0.62, 0.08, -0.62)), DVec3::splat(0.08));
-    Strip { center: STAGE, opens_to: LAMP, radius: 0.3, height: 0.12, thickness: 0.004, segments: 240 }
+    Strip { center: STAGE, opens_to: LAMP, radius: 0.24, height: 0.12, thickness: 0.004, segments: 240 }
         .add(&mut obj, "strip", "brass");
     parts::lamp(&mut obj, LAMP, STAGE, LAMP_SIDE);
+    shade(&mut obj);
     scene("brushed_funnel", obj, MTL, &format!("# {comment}.\n{TOML}"))
 }
 
@@ -120,4 +121,15 @@ fn funnel(obj: &mut Obj) {
     let foot = |s: usize| axis + around(s) * (below - 0.04);
     obj.sheet(steps, |s| (foot(s) - DVec3::Y * axis.y, foot(s), around(s)));
     obj.sheet(steps, |s| (foot(s), axis + around(s) * below, -DVec3::Y));
+}
+
+/// A board beside the lamp: the funnel shows what the lamp shines on, and not the lamp.
+fn shade(obj: &mut Obj) {
+    let ahead = ((STAGE - LAMP) * dvec3(1.0, 0.0, 1.0)).normalize();
+    let towards_funnel = DVec3::Y.cross(ahead);
+    let (length, away) = (0.14, 0.024);
+    let middle = LAMP + ahead * (0.5 * length - 0.02) + towards_funnel * away;
+    let turned = DQuat::from_rotation_arc(DVec3::X, ahead);
+    obj.part("shade", "wood");
+    obj.cuboid(DAffine3::from_rotation_translation(turned, middle), dvec3(0.5 * length, 0.2, 0.002));
 }
