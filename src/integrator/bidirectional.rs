@@ -39,6 +39,8 @@ pub struct Bidirectional<'a> {
     pub(super) bvh: VertexBvh,
     pub(super) records: Records,
     pub(super) adaptive: Option<Adaptive>,
+    /// When iterations should be over.
+    pub(super) deadline: Option<Instant>,
 }
 
 impl<'a> Bidirectional<'a> {
@@ -57,6 +59,7 @@ impl<'a> Bidirectional<'a> {
             bvh: VertexBvh::new(),
             records: Records::default(),
             adaptive: None,
+            deadline: None,
         };
         machine.resize(Size::of(settings, &world.scene.film))?;
         Ok(machine)
@@ -136,6 +139,10 @@ impl Integrator for Bidirectional<'_> {
         if self.recipe.base != Base::OwnPath && self.recipe.eye_subpaths {
             self.adaptive = Some(Adaptive::new(&self.world.scene.film));
         }
+    }
+
+    fn finish_by(&mut self, deadline: Instant) {
+        self.deadline = Some(deadline);
     }
 
     fn iterate(&mut self, iteration: u64, film: &mut Film, progress: &(dyn Fn(f64) + Sync)) -> Result<Tally> {

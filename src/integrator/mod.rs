@@ -21,6 +21,7 @@ use crate::film::{Film, FilmSettings};
 use crate::settings::Settings;
 use crate::subpath::World;
 use crate::tally::Tally;
+use std::time::Instant;
 
 /// How large an iteration is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -54,6 +55,10 @@ pub trait Integrator {
     /// From now on, eye samples of an iteration go to the pixels that need them, as those before showed. Iterations then
     /// depend on those before.
     fn adapt(&mut self) {}
+
+    /// The next iteration should be over by then, with fewer or more eye samples than its size says, if need be; what it
+    /// counts for stays as it is. Iterations then depend on the clock.
+    fn finish_by(&mut self, _deadline: Instant) {}
 
     /// Runs one iteration and adds it to the film, its samples counted. The result depends on the seed and the
     /// iteration's number alone, unless it adapts. `progress` is told the finished fraction now and then, from any thread.

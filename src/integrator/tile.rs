@@ -36,18 +36,20 @@ pub struct Sample {
 pub(super) struct Part {
     /// Its number.
     pub index: u32,
-    /// How many there are.
+    /// How many there were to be.
     pub of: u32,
+    /// What it counts for, of the iteration.
+    pub share: f64,
 }
 
 impl Part {
     /// All samples at once.
-    pub const ALL: Self = Self { index: 0, of: 1 };
+    pub const ALL: Self = Self { index: 0, of: 1, share: 1.0 };
 
-    /// Which of a pixel's samples belong to it.
+    /// Which of a pixel's samples belong to it: one at least. There is no end to them, should there be more parts.
     fn range(&self, samples: u32) -> std::ops::Range<u32> {
         let bound = |index: u32| (u64::from(samples) * u64::from(index) / u64::from(self.of)) as u32;
-        bound(self.index)..bound(self.index + 1)
+        bound(self.index)..bound(self.index + 1).max(bound(self.index) + 1)
     }
 }
 
@@ -78,13 +80,13 @@ pub(super) fn sample_film(
                         let pixel = u64::from(y) * u64::from(width) + u64::from(x);
                         let plan = plans
                             .map_or(PixelPlan { samples, share: 1.0 }, |plans| plans.pixel(x, y, samples));
+                        let taken = part.range(plan.samples);
                         // A pixel of fewer or more samples than it counts.
-                        let scale = f64::from(samples) / f64::from(plan.samples);
+                        let scale = f64::from(samples) * part.share / taken.len() as f64;
                         let offset =
                             if plan.share < 1.0 { pixel_offset(seed, iteration, pixel) } else { 0.0 };
                         let family = Family::new(seed, iteration, Stream::Eye, pixel);
                         let mut sums = PixelSums::default();
-                        let taken = part.range(plan.samples);
                         tally.camera_rays += taken.len() as u64;
                         let values = taken.map(|n| {
                             let index = pixel * u64::from(samples) + u64::from(n);

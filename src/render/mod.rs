@@ -19,7 +19,7 @@ use crate::subpath::World;
 use crate::tally::Tally;
 use sizing::{Measured, Sizing};
 use std::sync::atomic::{AtomicU64, Ordering};
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 /// What a render leaves.
 #[derive(Debug)]
@@ -120,11 +120,12 @@ fn run(scene: &Scene, settings: &Settings, observer: &dyn Observer) -> Result<Ou
         bytes = (bytes.0.max(cache), bytes.1.max(tree));
         if let Some(sizing) = &sizing {
             let measured = Measured { size, tally: done, bytes: cache + tree };
-            let Some((next, weight)) = sizing.next(start.elapsed().as_secs_f64(), &measured) else { break };
-            size = next;
+            let Some(next) = sizing.next(start.elapsed().as_secs_f64(), &measured) else { break };
+            integrator.finish_by(Instant::now() + Duration::from_secs_f64(next.seconds));
+            size = next.size;
             integrator.resize(size)?;
-            film.set_weight(weight);
-            sizes.push((size, weight));
+            film.set_weight(next.weight);
+            sizes.push((size, next.weight));
         }
     }
     noise.update(&film, finished, true);

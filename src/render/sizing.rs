@@ -55,6 +55,17 @@ pub(super) struct Measured {
     pub bytes: usize,
 }
 
+/// What comes next.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Next {
+    /// The iteration's size.
+    pub size: Size,
+    /// What it counts for.
+    pub weight: u32,
+    /// How long it may take.
+    pub seconds: f64,
+}
+
 impl Sizing {
     /// `None` when the settings say it all: sizes, or a number of iterations.
     pub(super) fn new(settings: &Settings, film: &FilmSettings) -> Option<Self> {
@@ -84,8 +95,8 @@ impl Sizing {
         })
     }
 
-    /// The size of the next iteration after the last one, and what it counts for; `None` when the time is up.
-    pub(super) fn next(&self, elapsed: f64, last: &Measured) -> Option<(Size, u32)> {
+    /// The next iteration after the last one; `None` when the time is up.
+    pub(super) fn next(&self, elapsed: f64, last: &Measured) -> Option<Next> {
         let left = self.time - elapsed;
         if left < REST * self.time {
             return None;
@@ -131,10 +142,11 @@ impl Sizing {
             }
         };
         let weight = size.light_subpaths as f64 / self.preview.light_subpaths.max(1) as f64;
-        Some((
-            size,
-            if self.pairs && self.open != Open::Samples { weight.round().clamp(1.0, 1e6) as u32 } else { 1 },
-        ))
+        let weighted = self.pairs && self.open != Open::Samples;
+        let weight = if weighted { weight.round().clamp(1.0, 1e6) as u32 } else { 1 };
+        // Less where memory is short.
+        let planned = size.light_subpaths as f64 * per_subpath + f64::from(size.samples) * per_sample;
+        Some(Next { size, weight, seconds: planned.min(seconds) })
     }
 
     fn size(&self, samples: f64, subpaths: f64) -> Size {
@@ -172,7 +184,7 @@ mod tests {
             let bytes = (vertex_bytes * size.light_subpaths as f64) as usize;
             let last = Measured { size, tally: Tally { sides, ..Tally::default() }, bytes };
             match sizing.next(elapsed, &last) {
-                Some(next) => sizes.push(next),
+                Some(next) => sizes.push((next.size, next.weight)),
                 None => return (sizes, elapsed),
             }
             size = sizes.last().unwrap().0;
