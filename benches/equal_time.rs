@@ -41,12 +41,15 @@ fn main() {
     let number = |i: usize, default: f64| args.get(i).and_then(|a| a.parse().ok()).unwrap_or(default);
     let size = args.get(4).map_or("400x300", String::as_str);
     let size: Vec<u32> = size.split('x').map(|n| n.parse().expect("WIDTHxHEIGHT")).collect();
-    let budget = Budget { seconds: number(2, 60.0), runs: number(3, 8.0) as u64, threads: number(5, 0.0) as usize };
-    let (variants, recipes) = study::of(name, [size[0], size[1]]).expect("mirror, brushed, merging or graceful");
+    let budget =
+        Budget { seconds: number(2, 60.0), runs: number(3, 8.0) as u64, threads: number(5, 0.0) as usize };
+    let (variants, recipes) =
+        study::of(name, [size[0], size[1]]).expect("mirror, brushed, merging or graceful");
     let mut table = String::from(measure::HEADER);
     for variant in &variants {
         table += &compare(variant, &recipes, &budget, Path::new(directory));
-        hrr::file::replace(&Path::new(directory).join(format!("{name}.csv")), table.as_bytes()).expect("a file");
+        hrr::file::replace(&Path::new(directory).join(format!("{name}.csv")), table.as_bytes())
+            .expect("a file");
     }
 }
 
@@ -58,7 +61,8 @@ fn compare(variant: &Variant, recipes: &[Recipe], budget: &Budget, directory: &P
     };
     let reference = variant.referee.as_ref().map(|referee| {
         let seconds = budget.seconds * REFERENCE.1;
-        let runs = (0..REFERENCE.0).map(|i| run(variant, &settings(referee, REFERENCE_SEED + i, seconds)).image);
+        let runs =
+            (0..REFERENCE.0).map(|i| run(variant, &settings(referee, REFERENCE_SEED + i, seconds)).image);
         runs.collect::<Vec<_>>()
     });
     let mut runs: Vec<Vec<Run>> = recipes.iter().map(|_| Vec::new()).collect();
@@ -78,7 +82,11 @@ fn compare(variant: &Variant, recipes: &[Recipe], budget: &Budget, directory: &P
         }
         println!("{:24} {:22} {}", variant.name, recipe.name, measure::summary(runs, &sums));
         picture(directory, &format!("{}_{}", variant.name, recipe.name), &runs[0].image);
-        picture(directory, &format!("{}_{}_error", variant.name, recipe.name), &yardstick.map(&runs[0].image));
+        picture(
+            directory,
+            &format!("{}_{}_error", variant.name, recipe.name),
+            &yardstick.map(&runs[0].image),
+        );
     }
     if let Some(images) = &reference {
         picture(directory, &format!("{}_reference", variant.name), &measure::mean(images.iter()));

@@ -9,6 +9,7 @@ use hrr::math::Spectrum;
 use hrr::scene::Scene;
 use hrr::settings::{Backend, Integrator, Settings};
 use hrr::subpath::World;
+use std::time::{Duration, Instant};
 
 /// Many small iterations, each with its own numbers: `seed` sets integrators apart, so that their noise is independent.
 fn run(scene: &Scene, integrator: Integrator, seed: u64, iterations: u64, samples: u32) -> Estimate {
@@ -151,14 +152,14 @@ fn vertex_merging_agrees_on_every_material() {
     }
 }
 
-/// Iterations that grow, count by their size, and spread their samples by what those before showed.
+/// Iterations that grow, count by their size, spread their samples by what those before showed, and end early or late.
 #[test]
 fn growing_and_adapting_keep_the_mean() {
     let scene = scenes::load(
         "caustic_mirror",
         &[("film.width", "40"), ("film.height", "32"), ("material.mirror.alpha", "0.05")],
     );
-    for integrator in [Integrator::Pt, Integrator::Lvc, Integrator::LvcHrr] {
+    for integrator in [Integrator::Pt, Integrator::Lvc, Integrator::LvcHrr, Integrator::PcbptHrr] {
         let fixed = run(&scene, integrator, 1, 96, 12);
         let growing = estimate_of(&scene, 48, 8, |seed| {
             let settings = Settings {
@@ -172,7 +173,9 @@ fn growing_and_adapting_keep_the_mean() {
             let mut integrator = hrr::integrator::new(&world, &settings).unwrap();
             let mut film = Film::new(&scene.film);
             integrator.adapt();
-            for (iteration, samples) in [2, 6, 16].into_iter().enumerate() {
+            // Half of the renders have no time for the second half of their samples, the others have twice as much.
+            integrator.finish_by(Instant::now() + Duration::from_secs(seed % 2 * 1000));
+            for (iteration, samples) in [2, 6, 24].into_iter().enumerate() {
                 let light_subpaths = 1280 * u64::from(samples);
                 integrator.resize(Size { samples, light_subpaths }).unwrap();
                 film.set_weight(samples);

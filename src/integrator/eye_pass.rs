@@ -1,10 +1,11 @@
 //! The eye pass: what an eye sample sees, by every technique that is on.
 
 use super::bidirectional::Bidirectional;
+use super::parts::{self, Part, Parts};
 use super::recipe::Base;
 use super::records::{self, Records};
 use super::spread::Seen;
-use super::tile::{self, Part, Sample};
+use super::tile::{self, Sample};
 use crate::connect::{EyeVertex, Onward};
 use crate::film::Film;
 use crate::math::Spectrum;
@@ -13,43 +14,6 @@ use crate::sampler::{Purpose, Sampler};
 use crate::subpath::Walk;
 use crate::tally::{Clock, Tally};
 use crate::visibility::Ray;
-use std::time::Instant;
-
-/// Parts of an eye pass that must end in time, and samples in each at least.
-const PARTS: u32 = 8;
-const LEAST_SAMPLES: u32 = 4;
-
-/// The parts that the eye samples of an iteration are taken in. When half of them are done, what these took tells how many
-/// more there is time for; these then count for the other half.
-struct Parts {
-    of: u32,
-    done: u32,
-    end: u32,
-    start: Instant,
-}
-
-impl Parts {
-    fn new(of: u32) -> Self {
-        Self { of, done: 0, end: of, start: Instant::now() }
-    }
-
-    /// The next one, if there is one.
-    fn next(&mut self, deadline: Option<Instant>) -> Option<Part> {
-        let (half, index) = (self.of / 2, self.done);
-        if half > 0 && index == half && let Some(deadline) = deadline {
-            let each = self.start.elapsed().as_secs_f64() / f64::from(half);
-            let left = deadline.saturating_duration_since(Instant::now()).as_secs_f64();
-            self.end = half + ((left / each).round() as u32).clamp(1, 2 * (self.of - half));
-        }
-        if index == self.end {
-            return None;
-        }
-        self.done += 1;
-        let planned = if index < half { 1 } else { self.of - half };
-        let taken = if index < half { 1 } else { self.end - half };
-        Some(Part { index, of: self.of, share: f64::from(planned) / f64::from(self.of) / f64::from(taken) })
-    }
-}
 
 impl Bidirectional<'_> {
     /// The eye pass of an iteration, and what it needs to know of the light pass before.
@@ -64,7 +28,7 @@ impl Bidirectional<'_> {
         let records = self.recipe.base == Base::Probabilistic;
         let of = match self.deadline {
             _ if records => self.size.samples.div_ceil(records::SAMPLES),
-            Some(_) => (self.size.samples / LEAST_SAMPLES).clamp(1, PARTS),
+            Some(_) => (self.size.samples / parts::LEAST_SAMPLES).clamp(1, parts::PARTS),
             None => 1,
         };
         let mut parts = Parts::new(of);
@@ -78,9 +42,14 @@ impl Bidirectional<'_> {
                 self.records = Records::new(self.world, self.settings, &self.techniques, cache, part, tally);
             }
             let on_part = |fraction: f64| progress((f64::from(index) + fraction) / f64::from(parts.end));
-            tally.add(&tile::sample_film(film, key, part, adaptive.as_mut(), &on_part, |sample, clock, tally| {
-                self.radiance(sample, clock, tally)
-            }));
+            tally.add(&tile::sample_film(
+                film,
+                key,
+                part,
+                adaptive.as_mut(),
+                &on_part,
+                |sample, clock, tally| self.radiance(sample, clock, tally),
+            ));
         }
         self.adaptive = adaptive;
     }

@@ -9,6 +9,7 @@ mod eye_pass;
 mod guiding;
 mod light_pass;
 mod merging;
+mod parts;
 mod records;
 mod spread;
 mod tile;

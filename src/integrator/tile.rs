@@ -1,5 +1,6 @@
 //! Pixels in square tiles, spread over threads.
 
+use super::parts::Part;
 use super::spread::{Adaptive, PixelPlan, PixelSums, Seen};
 use crate::film::Film;
 use crate::sampler::{Family, Purpose, Sampler, Stream};
@@ -29,28 +30,6 @@ pub struct Sample {
     pub sampler: Sampler,
     /// How often it counts as having played the roulette; 0: it does not play.
     pub plays: f64,
-}
-
-/// One of the equal parts that an iteration's eye samples are taken in.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Part {
-    /// Its number.
-    pub index: u32,
-    /// How many there were to be.
-    pub of: u32,
-    /// What it counts for, of the iteration.
-    pub share: f64,
-}
-
-impl Part {
-    /// All samples at once.
-    pub const ALL: Self = Self { index: 0, of: 1, share: 1.0 };
-
-    /// Which of a pixel's samples belong to it: one at least. There is no end to them, should there be more parts.
-    fn range(&self, samples: u32) -> std::ops::Range<u32> {
-        let bound = |index: u32| (u64::from(samples) * u64::from(index) / u64::from(self.of)) as u32;
-        bound(self.index)..bound(self.index + 1).max(bound(self.index) + 1)
-    }
 }
 
 /// Takes a part of the samples of every pixel of a film, `samples` or what `adaptive` says, and adds what `radiance` makes

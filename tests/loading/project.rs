@@ -28,6 +28,8 @@ fn the_scenes_load_without_a_warning() {
         ("caustic_mirror_aniso", 5530),
         ("glass_caustic", 20214),
         ("mirror_room", 13056),
+        ("brushed_funnel", 7364),
+        ("glossy_corridor", 13020),
     ] {
         let scene = Scene::load(&folder.join(name).join("scene.toml"), &[]).unwrap();
         assert_eq!(scene.warnings, [""; 0], "{name}");

@@ -22,13 +22,11 @@ pub struct Variant {
     pub referee: Option<Recipe>,
 }
 
-const PCBPT: Recipe =
-    Recipe { name: "pcbpt", set: |s| Settings { integrator: Integrator::Pcbpt, ..s } };
+const PCBPT: Recipe = Recipe { name: "pcbpt", set: |s| Settings { integrator: Integrator::Pcbpt, ..s } };
 const PCBPT_HRR: Recipe =
     Recipe { name: "pcbpt+hrr", set: |s| Settings { integrator: Integrator::PcbptHrr, ..s } };
 const LVC: Recipe = Recipe { name: "lvc", set: |s| Settings { integrator: Integrator::Lvc, ..s } };
-const LVC_HRR: Recipe =
-    Recipe { name: "lvc+hrr", set: |s| Settings { integrator: Integrator::LvcHrr, ..s } };
+const LVC_HRR: Recipe = Recipe { name: "lvc+hrr", set: |s| Settings { integrator: Integrator::LvcHrr, ..s } };
 const PCVCM: Recipe = Recipe { name: "pcvcm", set: |s| Settings { integrator: Integrator::Pcvcm, ..s } };
 const PCVCM_HRR: Recipe =
     Recipe { name: "pcvcm+hrr", set: |s| Settings { integrator: Integrator::PcvcmHrr, ..s } };
@@ -40,9 +38,7 @@ pub fn of(study: &str, size: [u32; 2]) -> Option<(Vec<Variant>, Vec<Recipe>)> {
         // Caustics reflected in a mirror of roughness 1e-4.
         "mirror" => (vec![judged(load("caustic_mirror"), "mirror")], vec![PCBPT, PCBPT_HRR]),
         // Caustics reflected in brushed metal of roughness 1e-4 and 1e-2.
-        "brushed" => {
-            (vec![judged(load("brushed_funnel"), "steel")], vec![PCBPT, PCBPT_HRR])
-        }
+        "brushed" => (vec![judged(load("brushed_funnel"), "steel")], vec![PCBPT, PCBPT_HRR]),
         // What the roulette costs beside merging.
         "merging" => (vec![variant(load("mirror_room"), "mirror")], vec![PCVCM, PCVCM_HRR]),
         // Where the roulette has little to gain, or nothing.
@@ -52,8 +48,15 @@ pub fn of(study: &str, size: [u32; 2]) -> Option<(Vec<Variant>, Vec<Recipe>)> {
 }
 
 fn graceful(size: [u32; 2]) -> Vec<Variant> {
-    let plain = ["cornell", "caustic_mirror", "caustic_mirror_aniso", "glass_caustic", "mirror_room", "brushed_funnel",
-        "glossy_corridor"];
+    let plain = [
+        "cornell",
+        "caustic_mirror",
+        "caustic_mirror_aniso",
+        "glass_caustic",
+        "mirror_room",
+        "brushed_funnel",
+        "glossy_corridor",
+    ];
     let mut variants: Vec<Variant> = plain.iter().map(|name| variant(load(name, size), "mirror")).collect();
     let mut change = |name: &str, scene: &str, change: fn(&mut Scene)| {
         let mut scene = load(scene, size);
@@ -81,7 +84,11 @@ fn load(name: &str, size: [u32; 2]) -> Scene {
 }
 
 fn variant(scene: Scene, material: &str) -> Variant {
-    let name = scene.path.parent().and_then(Path::file_name).map_or_else(String::new, |n| n.to_string_lossy().into());
+    let name = scene
+        .path
+        .parent()
+        .and_then(Path::file_name)
+        .map_or_else(String::new, |n| n.to_string_lossy().into());
     Variant { name, region: pixels_of(&scene, material), scene, referee: None }
 }
 
