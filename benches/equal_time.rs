@@ -3,7 +3,7 @@
 //!
 //! `cargo bench --bench equal_time -- STUDY DIRECTORY [seconds] [runs] [size] [threads]`
 //!
-//! STUDY: `mirror`, `brushed`, `merging`, `graceful` (see [`study::of`]). Writes DIRECTORY/STUDY.csv, a picture of each
+//! STUDY: `mirror`, `brushed`, `merging`, `graceful`, `convergence` (see [`study::of`]). Writes DIRECTORY/STUDY.csv, a picture of each
 //! recipe's first run and one of where its runs differ; benches/record/equal_time.md tells what came of it.
 
 #[path = "support/equal_time/measure.rs"]
@@ -43,8 +43,7 @@ fn main() {
     let size: Vec<u32> = size.split('x').map(|n| n.parse().expect("WIDTHxHEIGHT")).collect();
     let budget =
         Budget { seconds: number(2, 60.0), runs: number(3, 8.0) as u64, threads: number(5, 0.0) as usize };
-    let (variants, recipes) =
-        study::of(name, [size[0], size[1]]).expect("mirror, brushed, merging or graceful");
+    let (variants, recipes) = study::of(name, [size[0], size[1]]).expect("one of the studies");
     let mut table = String::from(measure::HEADER);
     for variant in &variants {
         table += &compare(variant, &recipes, &budget, Path::new(directory));
@@ -57,7 +56,8 @@ fn main() {
 fn compare(variant: &Variant, recipes: &[Recipe], budget: &Budget, directory: &Path) -> String {
     let settings = |recipe: &Recipe, seed: u64, seconds: f64| {
         let threads = budget.threads;
-        (recipe.set)(Settings { seed, time: Some(seconds), threads, ..variant.scene.settings.clone() })
+        let time = Some(seconds * variant.time);
+        (recipe.set)(Settings { seed, time, threads, ..variant.scene.settings.clone() })
     };
     let reference = variant.referee.as_ref().map(|referee| {
         let seconds = budget.seconds * REFERENCE.1;
@@ -76,7 +76,7 @@ fn compare(variant: &Variant, recipes: &[Recipe], budget: &Budget, directory: &P
         let yardstick = Yardstick::new(&variant.region, reference.as_deref(), runs);
         let mut sums = Vec::new();
         for (seed, run) in runs.iter().enumerate() {
-            let errors = yardstick.errors(seed, &run.image);
+            let errors = yardstick.errors(&run.image);
             rows += &measure::row(variant, recipe, seed, &run.cost, &errors);
             sums.push(errors);
         }

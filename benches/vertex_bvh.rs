@@ -1,18 +1,24 @@
 //! How long the tree over light vertices takes to build, against obvhs and Embree's Morton builder on the same points
-//! in the same run. `cargo bench --bench vertex_bvh`.
+//! in the same run; and how fast it finds the vertices within a radius, against a hash grid.
+//!
+//! `cargo bench --bench vertex_bvh -- [build|within]`
 
 #[cfg(feature = "embree")]
 #[path = "support/embree_builder.rs"]
 mod embree_builder;
 
+#[path = "support/hash_grid.rs"]
+mod hash_grid;
 #[path = "support/workload.rs"]
-#[expect(dead_code, reason = "queries are not timed here")]
+#[expect(dead_code, reason = "the roulette's queries are not timed here")]
 mod workload;
 
 use hrr::vertex_bvh::VertexBvh;
 use obvhs::aabb::Aabb;
 use obvhs::ploc::PlocBuilder;
 use obvhs::{BvhBuildParams, bvh2::builder::build_bvh2};
+use rayon::prelude::*;
+use std::hint::black_box;
 use std::time::{Duration, Instant};
 
 /// Repetitions of which the fastest counts.
@@ -25,6 +31,60 @@ fn seconds(work: impl FnOnce()) -> f64 {
 }
 
 fn main() {
+    let args: Vec<String> = std::env::args().skip(1).filter(|a| !a.starts_with("--")).collect();
+    let run = |name: &str| args.is_empty() || args[0] == name;
+    if run("build") {
+        build();
+    }
+    if run("within") {
+        within();
+    }
+}
+
+/// Points of one set around points of another, as light vertices around eye vertices, all threads.
+fn within() {
+    let n = 1_000_000;
+    let points = workload::light_vertices(n);
+    let centers: Vec<_> = workload::light_vertices(2 * n)[n..].iter().map(|p| p.as_dvec3()).collect();
+    for radius in [0.0005, 0.002, 0.008] {
+        let mut times = [[f64::INFINITY; 2]; 2];
+        let (mut tree, mut found) = (VertexBvh::new(), [0; 2]);
+        for _ in 0..5 {
+            let mut grid = None;
+            let built = [
+                seconds(|| tree.build(&points).unwrap()),
+                seconds(|| grid = Some(hash_grid::HashGrid::new(&points, radius))),
+            ];
+            let grid = grid.as_ref().expect("it was made");
+            let count = |query: &(dyn Fn(glam::DVec3, &mut u64) + Sync)| {
+                let each = |center: &glam::DVec3| {
+                    let mut sum = 0;
+                    query(*center, &mut sum);
+                    sum
+                };
+                centers.par_iter().map(each).sum::<u64>()
+            };
+            let asked = [
+                seconds(|| found[0] = count(&|c, sum| tree.within(c, radius, &mut |_| *sum += 1))),
+                seconds(|| found[1] = count(&|c, sum| grid.within(c, radius, &mut |_| *sum += 1))),
+            ];
+            for i in 0..2 {
+                times[i] = [times[i][0].min(built[i]), times[i][1].min(asked[i])];
+            }
+        }
+        assert_eq!(found[0], black_box(found[1]), "both find the same");
+        println!("radius {radius}: {:.3} found on average", found[0] as f64 / n as f64);
+        for (name, [build, ask]) in ["tree", "hash grid"].iter().zip(times) {
+            println!(
+                "    {name:10} build {:6.1} ns/vertex, query {:7.1} ns",
+                build * 1e9 / n as f64,
+                ask * 1e9 / n as f64
+            );
+        }
+    }
+}
+
+fn build() {
     for n in [10_000, 100_000, 1_000_000, 4_000_000] {
         let points = workload::light_vertices(n);
         let boxes: Vec<_> = points.iter().map(|&p| Aabb::from_point(p.into())).collect();

@@ -77,7 +77,7 @@ impl<'a> Yardstick<'a> {
         }
     }
 
-    pub fn errors(&self, _run: usize, image: &Image) -> Errors {
+    pub fn errors(&self, image: &Image) -> Errors {
         let mean_of = |pixels: &mut dyn Iterator<Item = usize>| {
             let (mut sum, mut count) = (0.0, 0.0);
             for i in pixels {

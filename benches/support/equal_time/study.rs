@@ -18,6 +18,8 @@ pub struct Variant {
     pub scene: Scene,
     /// Pixels of special interest, by their index.
     pub region: Vec<usize>,
+    /// Its time, over that of others.
+    pub time: f64,
     /// What makes the reference; without one, errors are told from how runs differ.
     pub referee: Option<Recipe>,
 }
@@ -25,6 +27,7 @@ pub struct Variant {
 const PCBPT: Recipe = Recipe { name: "pcbpt", set: |s| Settings { integrator: Integrator::Pcbpt, ..s } };
 const PCBPT_HRR: Recipe =
     Recipe { name: "pcbpt+hrr", set: |s| Settings { integrator: Integrator::PcbptHrr, ..s } };
+const PT: Recipe = Recipe { name: "pt", set: |s| Settings { integrator: Integrator::Pt, ..s } };
 const LVC: Recipe = Recipe { name: "lvc", set: |s| Settings { integrator: Integrator::Lvc, ..s } };
 const LVC_HRR: Recipe = Recipe { name: "lvc+hrr", set: |s| Settings { integrator: Integrator::LvcHrr, ..s } };
 const PCVCM: Recipe = Recipe { name: "pcvcm", set: |s| Settings { integrator: Integrator::Pcvcm, ..s } };
@@ -43,6 +46,15 @@ pub fn of(study: &str, size: [u32; 2]) -> Option<(Vec<Variant>, Vec<Recipe>)> {
         "merging" => (vec![variant(load("mirror_room"), "mirror")], vec![PCVCM, PCVCM_HRR]),
         // Where the roulette has little to gain, or nothing.
         "graceful" => (graceful(size), vec![LVC, LVC_HRR]),
+        // How errors fall with time.
+        "convergence" => {
+            let times = [0.125, 0.25, 0.5, 1.0].map(|time| Variant {
+                name: format!("caustic_mirror x{time}"),
+                time,
+                ..variant(load("caustic_mirror"), "mirror")
+            });
+            (times.into(), vec![PT, LVC, PCBPT, LVC_HRR, PCBPT_HRR])
+        }
         _ => return None,
     })
 }
@@ -89,7 +101,7 @@ fn variant(scene: Scene, material: &str) -> Variant {
         .parent()
         .and_then(Path::file_name)
         .map_or_else(String::new, |n| n.to_string_lossy().into());
-    Variant { name, region: pixels_of(&scene, material), scene, referee: None }
+    Variant { name, region: pixels_of(&scene, material), scene, time: 1.0, referee: None }
 }
 
 fn judged(scene: Scene, material: &str) -> Variant {
