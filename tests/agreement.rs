@@ -2,12 +2,14 @@
 
 use crate::support::estimate::{Estimate, estimate, estimate_of};
 use crate::support::scenes;
+use glam::DVec3;
 use hrr::film::Film;
 use hrr::integrator::Size;
+use hrr::light::LightSource;
 use hrr::material::Material;
 use hrr::math::Spectrum;
 use hrr::scene::Scene;
-use hrr::settings::{Backend, Integrator, Settings};
+use hrr::settings::{Backend, EmitterVertices, Heuristic, Integrator, Settings};
 use hrr::subpath::World;
 
 /// Many small iterations, each with its own numbers: `seed` sets integrators apart, so that their noise is independent.
@@ -197,6 +199,49 @@ fn the_roulette_agrees_on_the_caustic_mirror() {
         let hrr = run(&scene, Integrator::LvcHrr, 2, 64, 4);
         let sure = hrr.assert_agrees_where_sure(&lvc, noise, alpha);
         assert!(sure >= least, "only {sure} blocks have converged");
+    }
+}
+
+/// With points of lights as vertices and without, and path tracing: many lamps, one, some without size, and a sky beside
+/// them, over polished, brushed, varnished and rough metal.
+#[test]
+fn emitter_vertices_keep_the_mean() {
+    let mut sizeless = scenes::lamps_over_a_glossy_floor(1);
+    let point =
+        |x: f64| LightSource::Point { position: DVec3::new(x, 0.9, 0.1), intensity: Spectrum::splat(0.2) };
+    sizeless.lights = (-4..5).map(|i| point(0.2 * f64::from(i))).collect();
+    let mut sky = scenes::lamps_over_a_glossy_floor(6);
+    sky.lights = scenes::lights_of_every_kind();
+    let scenes = [
+        ("many lamps", scenes::lamps_over_a_glossy_floor(14)),
+        ("a lamp", scenes::lamps_over_a_glossy_floor(1)),
+        ("lamps without size", sizeless),
+        ("lamps and a sky", sky),
+    ];
+    for (i, (name, scene)) in scenes.into_iter().enumerate() {
+        let run = |emitters, mis, seed| {
+            let settings = Settings {
+                integrator: Integrator::LvcHrr,
+                emitters,
+                mis,
+                seed,
+                expected: 2.0,
+                iterations: 64,
+                samples: 8,
+                max_depth: 8,
+                ..Settings::default()
+            };
+            estimate(&scene, &settings, 8)
+        };
+        let seed = 10 * i as u64;
+        let pt = self::run(&scene, Integrator::Pt, seed, 64, 32);
+        let off = run(EmitterVertices::Off, Heuristic::Balance, seed + 1);
+        let on = run(EmitterVertices::On, Heuristic::Balance, seed + 2);
+        let power = run(EmitterVertices::On, Heuristic::Power, seed + 3);
+        off.assert_agrees(&pt, 0.02, &format!("{name}, off"));
+        on.assert_agrees(&pt, 0.02, &format!("{name}, on"));
+        on.assert_agrees(&off, 0.02, &format!("{name}, on and off"));
+        power.assert_agrees(&pt, 0.02, &format!("{name}, power heuristic"));
     }
 }
 
