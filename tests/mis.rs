@@ -95,7 +95,7 @@ impl Path {
             (Some(e), _) => {
                 let lobes = t.lobes(&self.surfaces[0], self.to(1, 2));
                 let p = probability(&lobes, e.constant, self.position(0) - self.position(1));
-                // As many of N points as M samples are expected to keep, all told, over M; here a little fewer.
+                // The mean of 1 / (N P), for one sample, and M / N, for M that keep the same points.
                 1.0 / (1.0 / (e.points * p) + (e.samples - 1.0) / e.points)
             }
         };
