@@ -1,12 +1,12 @@
 //! What points of lights as vertices gain where lamps are many, and what they cost elsewhere.
 
+use crate::workload::cpu_seconds;
 use crate::{load, scenes};
 use hrr::film::{Film, FilmSettings};
 use hrr::math::luminance;
 use hrr::scene::Scene;
 use hrr::settings::{EmitterVertices, Integrator, Settings};
 use hrr::subpath::World;
-use std::time::Instant;
 
 /// Mean and square of each pixel over iterations, and the time.
 struct Sums {
@@ -46,9 +46,9 @@ fn compare(name: &str, scene: &Scene, settings: &Settings, rounds: u64) {
         for which in [round as usize % 2, 1 - round as usize % 2] {
             let (machine, sums) = (&mut machines[which], &mut sums[which]);
             let mut film = Film::new(&scene.film);
-            let start = Instant::now();
+            let start = cpu_seconds();
             let tally = machine.iterate(round, &mut film, &|_| ()).expect("an iteration");
-            sums.seconds += start.elapsed().as_secs_f64();
+            sums.seconds += cpu_seconds() - start;
             sums.accepted += tally.emitters.accepted;
             sums.queries += tally.emitters.queries;
             for (i, sum) in sums.pixels.iter_mut().enumerate() {
@@ -72,11 +72,17 @@ fn compare(name: &str, scene: &Scene, settings: &Settings, rounds: u64) {
     );
 }
 
-/// Variance times time, on over off: the lamps' scene, and scenes of one lamp.
+/// Variance times time, on over off: the lamps' scene, and scenes of one lamp. One thread and its processor time, so that
+/// other programs on the machine do not count.
 pub fn emitters(rounds: u64) {
+    let one = rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("a thread");
+    one.install(|| compare_all(rounds));
+}
+
+fn compare_all(rounds: u64) {
     let film = FilmSettings { width: 128, height: 96, ..FilmSettings::default() };
     let mut lamps = scenes::lamps_over_a_glossy_floor(14);
-    lamps.film = film;
+    lamps.film = film.clone();
     for samples in [1, 16] {
         for expected in [0.25, 1.0, 4.0] {
             let settings = Settings { samples, expected, ..Settings::default() };
