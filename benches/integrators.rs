@@ -1,12 +1,18 @@
-//! Whole integrators: what the roulette gains on a caustic seen in a mirror, and how many rays per second the path
-//! tracer keeps of what its ray queries alone would reach.
+//! Whole integrators: what the roulette gains on a caustic seen in a mirror, how many rays per second the path tracer
+//! keeps of what its ray queries alone would reach, and what points of lights as vertices gain and cost.
 //!
 //! `cargo bench --bench integrators -- caustic [scene] [seconds] [light subpaths] [samples]`
 //! `cargo bench --bench integrators -- rays`
+//! `cargo bench --bench integrators -- emitters [rounds]`
 
 #[cfg(feature = "embree")]
 #[path = "support/bare_embree.rs"]
 mod bare_embree;
+#[path = "support/emitters.rs"]
+mod emitters;
+#[path = "../tests/support/scenes.rs"]
+#[expect(dead_code, reason = "only one is wanted")]
+mod scenes;
 #[path = "support/workload.rs"]
 #[expect(dead_code, reason = "only its clock is wanted")]
 mod workload;
@@ -32,6 +38,9 @@ fn main() {
     }
     if run("rays") {
         rays();
+    }
+    if run("emitters") {
+        emitters::emitters(number(1, 12.0) as u64);
     }
 }
 

@@ -94,8 +94,9 @@ impl EyeVertex {
         if walk.after_delta {
             return Onward::Vertex(Self::new(techniques, walk, Total::default(), 0.0));
         }
-        let m = techniques.connection(&self.lobes, -walk.to_previous());
-        Onward::Vertex(Self::new(techniques, walk, m, techniques.next_event))
+        let back = -walk.to_previous();
+        let m = techniques.connection(&self.lobes, back);
+        Onward::Vertex(Self::new(techniques, walk, m, techniques.direct(&self.lobes, Some(back))))
     }
 
     /// What a segment that leaves the scene finds.
@@ -156,33 +157,64 @@ impl EyeVertex {
         *throughput * radiance * heuristic.weight(0.0, techniques.eye_hits, e)
     }
 
-    /// Technique s = 1: light straight from a point of a light. The value counts if the ray is free.
+    /// Technique s = 1: light straight from a point of a light, by next-event estimation. The value counts if the ray is
+    /// free.
     pub fn next_event(
         &self,
         world: &World<'_>,
         techniques: &Techniques,
         sampler: &Sampler,
     ) -> Option<(Spectrum, Ray)> {
-        let (depth, vertex) = (self.walk.depth, &self.walk.vertex);
+        let depth = self.walk.depth;
         let light = world
             .lights
             .sample(sampler.u1(depth, Purpose::LightPick), sampler.u2(depth, Purpose::LightPoint))?;
+        self.direct(world, techniques, &light, techniques.next_event, 1.0)
+    }
+
+    /// Technique s = 1 by the roulette over points of lights: from one that it kept. `tries`: how many points it judged,
+    /// times the probability that it kept this one; the value counts if the ray is free.
+    pub fn emitter_point(
+        &self,
+        world: &World<'_>,
+        techniques: &Techniques,
+        light: &LightPoint,
+        tries: f64,
+    ) -> Option<(Spectrum, Ray)> {
+        let offset = light.position()? - self.walk.vertex.point.position;
+        let m = techniques.emitter_points(&self.lobes, Some(offset));
+        self.direct(world, techniques, light, m, tries)
+    }
+
+    /// Light straight from a point of a light, by the technique that has the part `m` of m_1 and tries so often.
+    fn direct(
+        &self,
+        world: &World<'_>,
+        techniques: &Techniques,
+        light: &LightPoint,
+        m: f64,
+        tries: f64,
+    ) -> Option<(Spectrum, Ray)> {
+        let vertex = &self.walk.vertex;
         let Toward { w, distance2, cos: cos_light, radiance } = light.toward(vertex.point.position)?;
         if radiance == Spectrum::ZERO {
             return None;
         }
         let (factor, pdf_w) = vertex.toward_light(w);
         let value = self.walk.throughput * factor * radiance * (cos_light / distance2);
-        if value == Spectrum::ZERO {
+        if value == Spectrum::ZERO || !(m > 0.0) {
             return None;
         }
-        let (heuristic, m) = (techniques.heuristic, techniques.next_event);
-        let l = per_area(pdf_w, cos_light, distance2) * techniques.eye_hits(&light) / light.pdf();
-        let emission = techniques.emission_pdf(world, &light, -w, vertex.point.position);
+        let heuristic = techniques.heuristic;
+        let offset = light.position().map(|position| position - vertex.point.position);
+        let all = techniques.direct(&self.lobes, offset);
+        let l = per_area(pdf_w, cos_light, distance2) * techniques.eye_hits(light) / light.pdf();
+        let emission = techniques.emission_pdf(world, light, -w, vertex.point.position);
         let density = per_area(emission, vertex.cos_ng(w), distance2);
         let e = self.others(techniques, density, w, Origin::Lamp);
-        let value = value * (heuristic.weight(heuristic.raise(l), m, e) / light.pdf());
-        Some((value, offset::to_light(&vertex.point, &light)))
+        // Both techniques of s = 1 share its weight by their parts, whatever the heuristic.
+        let weight = heuristic.weight(heuristic.raise(l), all, e) * (m / all);
+        Some((value * (weight / (tries * light.pdf())), offset::to_light(&vertex.point, light)))
     }
 
     /// Techniques 2 <= s <= k-2: light from a vertex of a light subpath at `offset` from here. `tries`: how often the

@@ -17,6 +17,7 @@ struct Record {
     throughput: Vec3,
     depth: u32,
     after_delta: bool,
+    from_afar: bool,
     origins: [Origin; 2],
     side: Side,
 }
@@ -57,6 +58,7 @@ impl LightCache {
             throughput: light.throughput.as_vec3(),
             depth: light.depth,
             after_delta: light.after_delta,
+            from_afar: light.from_afar,
             origins: light.origins,
             side: light.side,
         });
@@ -130,6 +132,7 @@ impl LightCache {
             distance: f64::from(r.distance),
             depth: r.depth,
             after_delta: r.after_delta,
+            from_afar: r.from_afar,
             origins: r.origins,
         }
     }

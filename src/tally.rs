@@ -14,6 +14,8 @@ pub struct Tally {
     pub light_vertices: u64,
     /// Roulette queries and what they visited.
     pub roulette: QueryCounters,
+    /// Roulette queries over points of lights, and what they visited.
+    pub emitters: QueryCounters,
     /// Shadow rays of connections of any kind.
     pub connection_rays: u64,
     /// Those of them that met nothing.
@@ -43,6 +45,7 @@ impl Tally {
         self.light_subpaths += other.light_subpaths;
         self.light_vertices += other.light_vertices;
         self.roulette.add(&other.roulette);
+        self.emitters.add(&other.emitters);
         self.connection_rays += other.connection_rays;
         self.visible_connections += other.visible_connections;
         self.merged += other.merged;

@@ -27,6 +27,8 @@ pub struct Techniques {
     pub light_image: f64,
     /// m_s, 2 <= s <= k-2, where the roulette is off: of light vertices of any kind.
     pub base: f64,
+    /// The rest of m_1: points of lights that are not distant, judged by the roulette.
+    pub emitters: Option<EmitterRoulette>,
     /// m_s where the roulette is on.
     pub roulette: Option<Roulette>,
     /// How light vertices are merged with eye vertices.
@@ -61,6 +63,9 @@ pub struct Roulette {
     pub light_subpaths: f64,
     /// C, world units squared.
     pub constant: f64,
+    /// Most that C times a vertex's lobes may have on their axes, world units squared: heavier lobes are scaled down to
+    /// it. Infinity: no limit.
+    pub most: f64,
     /// Largest GGX roughness at which it plays.
     pub max_alpha: f64,
 }
@@ -69,6 +74,26 @@ impl Roulette {
     /// m_s of an edge with this offset (light - eye).
     pub fn density(&self, lobes: &[Lobe], offset: DVec3) -> f64 {
         self.light_subpaths * roulette::probability(lobes, self.constant, offset)
+    }
+}
+
+/// The roulette over points of lights, at eye vertices with lobes.
+#[derive(Debug, Clone, Copy)]
+pub struct EmitterRoulette {
+    /// N, points drawn, those of distant lights included.
+    pub points: f64,
+    /// M, eye samples of a pixel, which judge the same points.
+    pub samples: f64,
+    /// C, world units squared.
+    pub constant: f64,
+}
+
+impl EmitterRoulette {
+    /// Its part of m_1, for a point at an offset (light - eye): about as many different points as the samples of a pixel
+    /// keep, for each of them.
+    pub fn density(&self, lobes: &[Lobe], offset: DVec3) -> f64 {
+        let p = roulette::probability(lobes, self.constant, offset);
+        self.points * p / (1.0 + (self.samples - 1.0) * p)
     }
 }
 
@@ -87,6 +112,14 @@ impl Lobes {
         self.list[self.count] = lobe;
         self.count += 1;
     }
+
+    /// Scales them down until the sum of their weights is at most `most`.
+    fn limit(&mut self, most: f64) {
+        let sum: f64 = self.iter().map(Lobe::weight).sum();
+        if sum > most {
+            self.list.iter_mut().for_each(|lobe| *lobe = lobe.with_weight(lobe.weight() * (most / sum)));
+        }
+    }
 }
 
 impl Deref for Lobes {
@@ -104,6 +137,7 @@ impl Techniques {
             heuristic,
             eye_hits: 0.0,
             next_event: 0.0,
+            emitters: None,
             light_image: 0.0,
             base: 0.0,
             roulette: None,
@@ -145,7 +179,22 @@ impl Techniques {
             // Half of the greatest value of f cos, the mean over the hemisphere.
             lobes.push(Lobe::sphere(0.5 * FRAC_1_PI * luminance(albedo)));
         }
+        lobes.limit(roulette.most / roulette.constant);
         lobes
+    }
+
+    /// The part of m_1 that [`Techniques::emitters`] has at an eye vertex. `offset`: from there to the light's point;
+    /// `None`: it is distant.
+    pub fn emitter_points(&self, lobes: &Lobes, offset: Option<DVec3>) -> f64 {
+        match (&self.emitters, offset) {
+            (Some(emitters), Some(offset)) if !lobes.is_empty() => emitters.density(lobes, offset),
+            _ => 0.0,
+        }
+    }
+
+    /// m_1, likewise.
+    pub fn direct(&self, lobes: &Lobes, offset: Option<DVec3>) -> f64 {
+        self.next_event + self.emitter_points(lobes, offset)
     }
 
     /// m_s of an edge between two surfaces, neither of them delta: where the roulette is off, and, over the probability
@@ -177,7 +226,10 @@ impl Techniques {
             return 0.0;
         }
         if light.depth == 1 {
-            return self.next_event;
+            if self.emitters.is_none() || light.from_afar {
+                return self.next_event;
+            }
+            return self.direct(&self.lobes(&light.vertex, w_eye), Some(light.to_previous()));
         }
         if self.roulette.is_none() {
             return self.base;

@@ -2,12 +2,14 @@
 
 use crate::support::estimate::{Estimate, estimate, estimate_of};
 use crate::support::scenes;
+use glam::DVec3;
 use hrr::film::Film;
 use hrr::integrator::Size;
+use hrr::light::LightSource;
 use hrr::material::Material;
 use hrr::math::Spectrum;
 use hrr::scene::Scene;
-use hrr::settings::{Backend, Integrator, Settings};
+use hrr::settings::{Backend, EmitterVertices, Heuristic, Integrator, Settings};
 use hrr::subpath::World;
 use std::time::{Duration, Instant};
 
@@ -200,6 +202,52 @@ fn the_roulette_agrees_on_the_caustic_mirror() {
         let hrr = run(&scene, Integrator::LvcHrr, 2, 64, 4);
         let sure = hrr.assert_agrees_where_sure(&lvc, noise, alpha);
         assert!(sure >= least, "only {sure} blocks have converged");
+    }
+}
+
+/// With points of lights as vertices, without, and by path tracing: many lamps, one, some without size, and a sky beside
+/// them, over polished, brushed, varnished and rough metal.
+#[test]
+fn emitter_vertices_keep_the_mean() {
+    let mut sizeless = scenes::lamps_over_a_glossy_floor(1);
+    let point =
+        |x: f64| LightSource::Point { position: DVec3::new(x, 0.9, 0.1), intensity: Spectrum::splat(0.2) };
+    sizeless.lights = (-4..5).map(|i| point(0.2 * f64::from(i))).collect();
+    let mut sky = scenes::lamps_over_a_glossy_floor(6);
+    sky.lights = scenes::lights_of_every_kind();
+    let scenes = [
+        ("many lamps", scenes::lamps_over_a_glossy_floor(14)),
+        ("a lamp", scenes::lamps_over_a_glossy_floor(1)),
+        ("lamps without size", sizeless),
+        ("lamps and a sky", sky),
+    ];
+    for (i, (name, scene)) in scenes.into_iter().enumerate() {
+        let run = |integrator, emitters, mis, max_depth, seed| {
+            let settings = Settings {
+                integrator,
+                emitters,
+                mis,
+                max_depth,
+                seed: 10 * i as u64 + seed,
+                visibility: Backend::BEST,
+                expected: 2.0,
+                iterations: 64,
+                samples: 8,
+                ..Settings::default()
+            };
+            estimate(&scene, &settings, 8)
+        };
+        let hrr = |emitters, mis, max_depth, seed| run(Integrator::LvcHrr, emitters, mis, max_depth, seed);
+        let (on, off) = (EmitterVertices::On, EmitterVertices::Off);
+        // Direct light only: the caustics of small lamps, path tracing all but misses.
+        let pt = run(Integrator::Pt, off, Heuristic::Balance, 2, 1);
+        let direct = hrr(on, Heuristic::Balance, 2, 2);
+        direct.assert_agrees(&pt, 0.02, &format!("{name}, direct light"));
+        let without = hrr(off, Heuristic::Balance, 8, 3);
+        for (mis, seed) in [(Heuristic::Balance, 4), (Heuristic::Power, 5)] {
+            let with = hrr(on, mis, 8, seed);
+            with.assert_agrees(&without, 0.02, &format!("{name}, on and off, {mis}"));
+        }
     }
 }
 

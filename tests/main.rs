@@ -22,6 +22,7 @@ mod determinism;
 mod effects;
 mod layers;
 mod mis;
+mod techniques;
 mod flip;
 mod report;
 mod study;

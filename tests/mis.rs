@@ -10,12 +10,13 @@ use hrr::light::distant::DistantPoint;
 use hrr::light::{EmissionGuide, LightPoint};
 use hrr::math::Spectrum;
 use hrr::mis::Heuristic;
+use hrr::roulette::probability;
 use hrr::sampler::{Purpose, Sampler, Stream};
 use hrr::scene::Scene;
 use hrr::settings::{Backend, Settings};
 use hrr::subpath::walk::Start;
 use hrr::subpath::{Origin, Role, Storing, Total, Vertex, Walk, World};
-use hrr::techniques::{Merging, Roulette, Techniques};
+use hrr::techniques::{EmitterRoulette, Merging, Roulette, Techniques};
 use hrr::visibility::offset;
 use std::sync::Arc;
 
@@ -26,7 +27,8 @@ const TECHNIQUES: Techniques = Techniques {
     next_event: 1.0,
     light_image: 700.0,
     base: 1.7,
-    roulette: Some(Roulette { light_subpaths: 1400.0, constant: 0.02, max_alpha: 0.3 }),
+    emitters: Some(EmitterRoulette { points: 230.0, samples: 3.0, constant: 0.03 }),
+    roulette: Some(Roulette { light_subpaths: 1400.0, constant: 0.02, most: 0.1, max_alpha: 0.3 }),
     merging: Some(Merging { light_subpaths: 1400.0, radius: 0.01 }),
     storing: Storing { share: 0.3, max_alpha: 0.22, lamps: false },
     guide: None,
@@ -86,6 +88,20 @@ impl Path {
             .map_or(0.0, |s| s.pdf * vertex.bsdf.survival())
     }
 
+    /// m_1 of next-event estimation and of the roulette over points of lights.
+    fn direct(&self, t: &Techniques) -> [f64; 2] {
+        let by_roulette = match (&t.emitters, &self.light) {
+            (None, _) | (_, LightPoint::Distant(_)) => 0.0,
+            (Some(e), _) => {
+                let lobes = t.lobes(&self.surfaces[0], self.to(1, 2));
+                let p = probability(&lobes, e.constant, self.position(0) - self.position(1));
+                // The mean of 1 / (N P), for one sample, and M / N, for M that keep the same points.
+                1.0 / (1.0 / (e.points * p) + (e.samples - 1.0) / e.points)
+            }
+        };
+        [t.next_event, by_roulette]
+    }
+
     /// Densities, up to a common factor, of all techniques s = 0 .. k-1, and of merging at x_0 .. x_{k-1}.
     fn densities(&self, world: &World<'_>, t: &Techniques) -> [Vec<f64>; 2] {
         let k = self.surfaces.len() + 2;
@@ -121,7 +137,7 @@ impl Path {
                 return 0.0;
             }
             if s == 1 {
-                return t.next_event;
+                return self.direct(t).iter().sum();
             }
             if s == k - 1 {
                 return t.light_image * has(Role::Seen, s - 1);
@@ -256,7 +272,7 @@ fn check_guided(scene: &Scene, heuristic: Heuristic) {
 }
 
 fn check(world: &World<'_>, t: &Techniques) {
-    let mut checked = [0usize; 6];
+    let mut checked = [0usize; 7];
     let mut with_delta = 0;
     for index in 0..16_000u64 {
         let eye_sampler = Sampler::new(1, 0, Stream::Eye, index);
@@ -301,7 +317,7 @@ fn check(world: &World<'_>, t: &Techniques) {
             if let Some((sky, value, throughput)) = into_the_sky(world, t, last, &eye_sampler) {
                 let path = path(LightPoint::Distant(sky), &[], &eyes);
                 close("sky", value.x / (throughput.x * sky.radiance.x), path.weight(world, t, 0, 0));
-                count(5, &path);
+                count(6, &path);
             }
             // s = 1: next-event estimation.
             let delta = last.walk.vertex.bsdf.is_delta();
@@ -321,8 +337,19 @@ fn check(world: &World<'_>, t: &Techniques) {
                     * x.factor(x.wo, w)
                     * light.toward(x.point.position).unwrap().radiance
                     * (x.cos_ng(w) * path.g(1, 0) / light.pdf());
-                close("s = 1", value.x / plain.x, path.weight(world, t, 0, 1));
+                let weight = path.weight(world, t, 0, 1);
+                let [by_nee, by_roulette] =
+                    path.direct(t).map(|m| m * weight / path.direct(t).iter().sum::<f64>());
+                close("s = 1", value.x / plain.x, by_nee);
                 count(1, &path);
+                // The same by the roulette over points of lights, where that plays.
+                match last.emitter_point(world, t, &light, 1.0) {
+                    Some((value, _)) => {
+                        close("emitter point", value.x / plain.x, by_roulette);
+                        count(5, &path);
+                    }
+                    None => assert_eq!(by_roulette, 0.0),
+                }
             }
         }
         if let (Some(light), Some(eye)) = (lights.last(), eyes.last())
@@ -380,6 +407,6 @@ fn check(world: &World<'_>, t: &Techniques) {
         }
     }
     println!("paths checked by kind of technique {checked:?}, with delta vertices {with_delta}");
-    let kinds = if world.lights.only_area() { 0..5 } else { 0..6 };
+    let kinds = if world.lights.only_area() { 0..6 } else { 0..7 };
     assert!(checked[kinds].iter().all(|&n| n >= 100) && with_delta >= 100, "{checked:?} {with_delta}");
 }

@@ -1,5 +1,6 @@
 //! The bidirectional machine: light pass, vertex BVH, eye pass. What it does in each is a [`Recipe`].
 
+use super::emitters::EmitterPoints;
 use super::merging;
 use super::recipe::{Base, Recipe};
 use super::records::Records;
@@ -16,6 +17,7 @@ use crate::tally::Tally;
 use crate::techniques::{Merging, Roulette, Techniques};
 use crate::vertex_bvh::VertexBvh;
 use glam::DVec2;
+use std::f64::consts::PI;
 use std::time::Instant;
 
 /// Share of an iteration's progress that the light side stands for.
@@ -37,6 +39,7 @@ pub struct Bidirectional<'a> {
     /// All vertices of the first light subpaths, for uniform picks, where `cache` has not got them all.
     pub(super) picks: LightCache,
     pub(super) bvh: VertexBvh,
+    pub(super) emitters: EmitterPoints,
     pub(super) records: Records,
     pub(super) adaptive: Option<Adaptive>,
     /// When iterations should be over.
@@ -57,6 +60,7 @@ impl<'a> Bidirectional<'a> {
             cache: LightCache::default(),
             picks: LightCache::default(),
             bvh: VertexBvh::new(),
+            emitters: EmitterPoints::default(),
             records: Records::default(),
             adaptive: None,
             deadline: None,
@@ -85,7 +89,7 @@ impl<'a> Bidirectional<'a> {
             lamps: !self.recipe.next_event,
         };
         let (recipe, n_l) = (&self.recipe, self.size.light_subpaths as f64);
-        let eye_samples = f64::from(self.size.samples);
+        let (eye_samples, area) = (f64::from(self.size.samples), self.world.scene.mesh.total_area());
         // The weights must not depend on an iteration's own number of vertices, hence a pre-pass of its own numbers.
         let [stored, all] = self.vertices_per_subpath();
         let vertices = (n_l * stored).max(1.0);
@@ -94,6 +98,8 @@ impl<'a> Bidirectional<'a> {
             heuristic: self.settings.mis,
             eye_hits: on(recipe.eye_subpaths, 1.0),
             next_event: on(recipe.next_event, 1.0),
+            // Planned below, by what is planned here.
+            emitters: None,
             light_image: on(recipe.light_image, n_l / eye_samples),
             base: match recipe.base {
                 Base::Off => 0.0,
@@ -109,10 +115,13 @@ impl<'a> Bidirectional<'a> {
             guide: self.techniques.guide.clone(),
             roulette: recipe.roulette.then(|| Roulette {
                 light_subpaths: n_l / eye_samples,
-                constant: self.settings.expected * self.world.scene.mesh.total_area() / vertices,
+                constant: self.settings.expected * area / vertices,
+                // On the axis of lobes of weight c, C c / d^2 is then at most X at d^2 = A / 4 pi.
+                most: self.settings.axis_probability.map_or(f64::INFINITY, |x| x * area / (4.0 * PI)),
                 max_alpha: self.settings.hrr_alpha,
             }),
         };
+        self.techniques.emitters = self.plan_emitters();
     }
 }
 
@@ -158,6 +167,7 @@ impl Integrator for Bidirectional<'_> {
             self.bvh.build(self.cache.positions())?;
             tally.vertex_bvh_build += build.elapsed().as_secs_f64();
         }
+        self.draw_emitters(iteration)?;
         tally.sides[0] = start.elapsed().as_secs_f64();
         let start = Instant::now();
         let on_eye_side = |fraction| progress(LIGHT_SHARE + (1.0 - LIGHT_SHARE) * fraction);
@@ -168,6 +178,8 @@ impl Integrator for Bidirectional<'_> {
     }
 
     fn bytes(&self) -> (usize, usize) {
-        (self.cache.bytes() + self.picks.bytes() + self.records.bytes(), self.bvh.bytes())
+        let (points, tree) = self.emitters.bytes();
+        let caches = self.cache.bytes() + self.picks.bytes() + self.records.bytes();
+        (caches + points, self.bvh.bytes() + tree)
     }
 }

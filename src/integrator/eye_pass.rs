@@ -67,6 +67,7 @@ impl Bidirectional<'_> {
             if !vertex.walk.vertex.bsdf.is_delta() {
                 rest += self.next_event(&vertex, sample, clock, tally);
                 if !vertex.lobes.is_empty() {
+                    rest += self.from_emitters(&vertex, &sample.sampler, clock, tally);
                     if sample.plays > 0.0 {
                         let sampler = &sample.sampler;
                         self.play_roulette(&vertex, sampler, clock, tally, &mut |_, value| kept += value);
@@ -92,7 +93,12 @@ impl Bidirectional<'_> {
     }
 
     /// Counts a connection's value if its ray is free.
-    fn if_visible(&self, connection: Option<(Spectrum, Ray)>, clock: Clock, tally: &mut Tally) -> Spectrum {
+    pub(super) fn if_visible(
+        &self,
+        connection: Option<(Spectrum, Ray)>,
+        clock: Clock,
+        tally: &mut Tally,
+    ) -> Spectrum {
         let Some((value, ray)) = connection else { return Spectrum::ZERO };
         let free = clock.time(&mut tally.visibility, || !self.world.visibility.occluded(&ray));
         if tally.connection(free) { value } else { Spectrum::ZERO }

@@ -5,6 +5,7 @@ pub mod recipe;
 pub mod plan;
 pub mod path;
 pub mod bidirectional;
+mod emitters;
 mod eye_pass;
 mod guiding;
 mod light_pass;

@@ -120,6 +120,11 @@ impl AreaLights {
         self.emitters.iter_mut().for_each(|e| e.pdf_a *= share);
     }
 
+    /// The sum of the squares of the triangles' shares of their light.
+    pub(super) fn concentration(&self) -> f64 {
+        (0..self.pick.len()).map(|i| self.pick.probability(i).powi(2)).sum()
+    }
+
     /// Number of emitting triangles.
     pub fn len(&self) -> usize {
         self.emitters.len()

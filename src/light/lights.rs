@@ -108,6 +108,17 @@ impl Lights {
         self.area.len() + self.others.len()
     }
 
+    /// How many lights of equal power the emitting triangles, point and spot lights amount to: the square of the sum of
+    /// their powers over the sum of the squares; 0 where there are none.
+    pub fn near_count(&self) -> f64 {
+        let lamps = (0..self.others.len()).filter(|&i| matches!(self.others[i], Other::Lamp(_)));
+        let (mut sum, mut squares) = (self.area_share, self.area_share.powi(2) * self.area.concentration());
+        for share in lamps.map(|i| self.probability(i)) {
+            (sum, squares) = (sum + share, squares + share * share);
+        }
+        if squares > 0.0 { sum * sum / squares } else { 0.0 }
+    }
+
     /// For each light, something that is equal where light is sent in similar ways.
     pub(super) fn kinds(&self) -> impl Iterator<Item = (u32, [i16; 3])> {
         // Every other light is a kind of its own, told from materials by its number's last bit.

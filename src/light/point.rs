@@ -48,6 +48,15 @@ pub struct Emission {
 }
 
 impl LightPoint {
+    /// Where it is, mesh coordinates; `None` for distant light.
+    pub fn position(&self) -> Option<DVec3> {
+        match self {
+            Self::Surface(e) => Some(e.point.position),
+            Self::Lamp(l) => Some(l.lamp.position),
+            Self::Distant(_) => None,
+        }
+    }
+
     /// Density of choosing this point among all lights' points: 1/m^2 on surfaces, 1/sr of distant light, a probability
     /// where [`LightPoint::is_delta`].
     pub fn pdf(&self) -> f64 {

@@ -87,11 +87,7 @@ impl QueryCounters {
 /// f64 minus the query's position. 0 when C or all weights are 0; 1 for a vertex on the eye vertex.
 #[inline(always)]
 pub fn probability(lobes: &[Lobe], constant: f64, offset: DVec3) -> f64 {
-    let mut sum = 0.0;
-    for lobe in lobes {
-        sum += lobe.weight() / lobe.h2(offset);
-    }
-    let p = constant * sum;
+    let p = constant * q_over_d2(lobes, offset);
     if p >= 1.0 {
         1.0
     } else if p > 0.0 {
@@ -99,6 +95,16 @@ pub fn probability(lobes: &[Lobe], constant: f64, offset: DVec3) -> f64 {
     } else {
         0.0 // also for NaN: 0/0 of a weightless lobe at its own vertex, 0 * inf of C = 0 there
     }
+}
+
+/// `q / d^2 = sum c_i / h_i^2` at `offset`, 1/(world unit)^2: what [`probability`] has of the lobes.
+#[inline(always)]
+pub fn q_over_d2(lobes: &[Lobe], offset: DVec3) -> f64 {
+    let mut sum = 0.0;
+    for lobe in lobes {
+        sum += lobe.weight() / lobe.h2(offset);
+    }
+    sum
 }
 
 /// The constant C with which a query accepts about `wanted` vertices while its probabilities stay below 1:

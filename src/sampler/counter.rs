@@ -38,6 +38,10 @@ pub enum Stream {
     GuideEye = 6,
     /// What all samples of a pixel share.
     Pixel = 7,
+    /// Points of lights that the roulette judges.
+    Emitters = 8,
+    /// The pre-pass that measures how many of them it would keep.
+    EmitterPilot = 9,
 }
 
 /// What a number decides at a vertex.
@@ -68,6 +72,8 @@ pub enum Purpose {
     RecordPick,
     /// Key of the roulette over all light vertices.
     Roulette,
+    /// Key of the roulette over points of lights.
+    EmitterRoulette,
 }
 
 impl Purpose {

@@ -119,6 +119,18 @@ choice! {
     }
 }
 
+choice! {
+    /// Whether the roulette judges points of lights as well.
+    EmitterVertices, "emitters", emitters {
+        /// It does not.
+        Off = "off",
+        /// It does.
+        On = "on",
+        /// Where there are many lights.
+        Auto = "auto",
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -128,6 +140,7 @@ mod tests {
         assert!(Integrator::ALL.iter().all(|v| v.to_string().parse() == Ok(*v)));
         assert!(Backend::ALL.iter().all(|v| v.to_string().parse() == Ok(*v)));
         assert!(Switch::ALL.iter().all(|v| v.to_string().parse() == Ok(*v)));
+        assert!(EmitterVertices::ALL.iter().all(|v| v.to_string().parse() == Ok(*v)));
         assert!(Heuristic::ALL.iter().all(|v| v.to_string().parse() == Ok(*v)));
         assert_eq!("lvc+hrr".parse(), Ok(Integrator::LvcHrr));
         assert_eq!("brute".parse(), Ok(Backend::Brute));

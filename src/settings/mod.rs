@@ -5,7 +5,7 @@ mod choices;
 mod effects;
 mod table;
 
-pub use choices::{Backend, Heuristic, Integrator, Switch};
+pub use choices::{Backend, EmitterVertices, Heuristic, Integrator, Switch};
 pub use effects::{Effect, EffectSet};
 pub use table::TABLE;
 
@@ -47,10 +47,15 @@ pub struct Settings {
     pub connections: u32,
     /// Expected number of light vertices that the roulette keeps where its probabilities stay below 1 (k).
     pub expected: f64,
+    /// Most that the acceptance probability may be on the axis of a lobe at the distance sqrt(A / 4 pi), A the scene's
+    /// surface area (X).
+    pub axis_probability: Option<f64>,
     /// Largest GGX roughness at which the roulette is used.
     pub hrr_alpha: f64,
     /// Probability of storing a light vertex whose predecessor does not scatter narrowly, where the roulette plays.
     pub storing: f64,
+    /// Whether the roulette judges points of lights as well.
+    pub emitters: EmitterVertices,
     /// Whether light subpaths are sent where earlier ones proved useful to the roulette.
     pub guiding: Switch,
     /// Whether eye samples go to the pixels that need them, where the renderer chooses their number.
@@ -88,8 +93,10 @@ impl Default for Settings {
             light_subpaths: 0,
             connections: 1,
             expected: 1.0,
+            axis_probability: None,
             hrr_alpha: 0.3,
             storing: 0.05,
+            emitters: EmitterVertices::Auto,
             guiding: Switch::On,
             adaptive: Switch::On,
             mis: Heuristic::Balance,

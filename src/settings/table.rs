@@ -1,6 +1,6 @@
 //! One row for every setting.
 
-use super::{Backend, Heuristic, Integrator, Kind, Setting, Switch};
+use super::{Backend, EmitterVertices, Heuristic, Integrator, Kind, Setting, Switch};
 
 const TRANSPORT: &str = "Light transport";
 const BUDGET: &str = "Budget and randomness";
@@ -112,6 +112,20 @@ pub const TABLE: &[Setting] = &[
               reaches 1. More of them lower the noise of each iteration and make it slower.",
     },
     Setting {
+        name: "axis_probability",
+        kind: Kind::Real {
+            min: 1e-6,
+            max: 1e6,
+            get: |s| s.axis_probability,
+            set: |s, v| s.axis_probability = Some(v),
+        },
+        default: "",
+        value_name: "X",
+        heading: TRANSPORT,
+        help: "Most that the roulette's (+hrr) probability may be on the axis of a lobe, in place of 'expected'",
+        doc: "Before the minimum with 1, at the distance sqrt(A / 4 pi), A the scene's surface area. Where it holds, about               X N alpha^2 of N light vertices are kept at a surface of GGX roughness alpha that absorbs nothing, and               2 sqrt(X) - 1 times as many as at X = 1 where X is over 1. The least of this and of 'expected' counts: where               'expected' asks for more than a narrow lobe can use, this saves the time; a large 'expected' leaves it to X               alone. 1 to 4 keep nearly all that is useful.",
+    },
+    Setting {
         name: "hrr_alpha",
         kind: Kind::Real { min: 0.0, max: 1.0, get: |s| Some(s.hrr_alpha), set: |s, v| s.hrr_alpha = v },
         default: "0.3",
@@ -129,6 +143,20 @@ pub const TABLE: &[Setting] = &[
         help: "Share of light vertices that are stored (+hrr) though no glossy surface threw light on them",
         doc: "Light from lamps and diffuse surfaces is found by eye subpaths as well; leaving most of it out of the cache \
               makes room and time for caustics. 1: all are stored, as always with vertex merging.",
+    },
+    Setting {
+        name: "emitters",
+        kind: Kind::Choice {
+            names: &EmitterVertices::NAMES,
+            planned: &[],
+            get: |s| s.emitters as usize,
+            set: |s, i| s.emitters = EmitterVertices::ALL[i],
+        },
+        default: "auto",
+        value_name: "NAME",
+        heading: TRANSPORT,
+        help: "Whether the roulette (+hrr) judges points of lights as well",
+        doc: "For many lights, or small ones, that glossy surfaces show: next-event estimation alone seldom tries the one               that a lobe points at. Of the points 'expected' are kept on average. auto: where all emitting triangles, point               and spot lights amount to at least 16 of equal power.",
     },
     Setting {
         name: "guiding",

@@ -27,6 +27,8 @@ pub struct Walk {
     pub depth: u32,
     /// Whether the previous vertex scattered by a delta lobe, so that nothing can connect to it.
     pub after_delta: bool,
+    /// Whether the segment that led here came in from a distant light.
+    pub from_afar: bool,
     /// Light side: what threw light on the vertex, and on the one before it.
     pub origins: [Origin; 2],
 }
@@ -111,6 +113,7 @@ impl Walk {
             distance: distance2.sqrt(),
             depth: 1,
             after_delta: false,
+            from_afar: start.distant,
             origins: [Origin::Lamp; 2],
         })
     }

@@ -90,6 +90,47 @@ pub fn box_of_textures() -> Scene {
     scene
 }
 
+/// A floor of glossy tiles, isotropic, brushed, varnished and rough, before a white wall, under a grid of `across` x
+/// `across` lamps of 1 cm that shine downwards.
+pub fn lamps_over_a_glossy_floor(across: u32) -> Scene {
+    let silver = Reflectance::Schlick { f0: Spectrum::splat(0.8) };
+    let metal = |alpha_x, alpha_y| Scattering::Conductor { reflectance: silver, alpha_x, alpha_y };
+    let varnish = Scattering::Coated {
+        albedo: Spectrum::new(0.2, 0.4, 0.6),
+        map: None,
+        f0: Spectrum::splat(0.08),
+        alpha_x: 0.06,
+        alpha_y: 0.03,
+    };
+    let mut brushed = Material::new("brushed", metal(0.02, 0.2));
+    brushed.tangent_angle = 0.5;
+    let mut lamp = Material::diffuse("lamp", Spectrum::ZERO);
+    // Whatever their number, the same light.
+    lamp.emission = Spectrum::new(1.0, 0.9, 0.8) * (2e4 / f64::from(across * across));
+    let materials = vec![
+        Material::diffuse("white", Spectrum::splat(0.7)),
+        Material::new("polished", metal(0.02, 0.02)),
+        brushed,
+        Material::new("varnished", varnish),
+        Material::new("rough", metal(0.2, 0.2)),
+        lamp,
+    ];
+    let mut mesh = Mesh::default();
+    for tile in 0..16u32 {
+        let (column, row) = (tile % 4, tile / 4);
+        let center = Vec3::new(column as f32 - 1.5, 0.0, row as f32 - 1.5) * 0.5;
+        let material = 1 + (column + row) % 4;
+        quad(&mut mesh, [[-1, 0, 1], [1, 0, 1], [1, 0, -1], [-1, 0, -1]], 0.25, center, material);
+    }
+    quad(&mut mesh, [[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]], 1.0, Vec3::new(0.0, 1.0, -1.0), 0);
+    for i in 0..across * across {
+        let at = |i: u32| ((i as f32 + 0.5) / across as f32 - 0.5) * 1.8;
+        let center = Vec3::new(at(i % across), 1.2, at(i / across));
+        quad(&mut mesh, [[-1, 0, -1], [1, 0, -1], [1, 0, 1], [-1, 0, 1]], 0.005, center, 5);
+    }
+    in_memory(mesh, materials, DVec3::new(0.3, 0.9, 2.2), DVec3::new(0.0, 0.1, 0.0), 45.0)
+}
+
 /// A point and a spot light in the box, a sun and an uneven sky in front of it.
 pub fn lights_of_every_kind() -> Vec<LightSource> {
     let sky = |i: u32| Vec3::splat(0.2 + (i % 7) as f32 * 0.3) * Vec3::new(1.0, 1.2, 1.5);
