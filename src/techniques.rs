@@ -6,6 +6,7 @@ use crate::math::luminance;
 use crate::mis::Heuristic;
 use crate::roulette::{self, Lobe};
 use crate::sampler::Sampler;
+use crate::settings::Range;
 use crate::subpath::walk::{Rules, Walk};
 use crate::subpath::{Role, Storing, Total, Vertex, World, from_light};
 use glam::DVec3;
@@ -63,6 +64,8 @@ pub struct Roulette {
     pub constant: f64,
     /// Largest GGX roughness at which it plays.
     pub max_alpha: f64,
+    /// Shape of the lobes' ranges, part of P wherever that stands.
+    pub range: Range,
 }
 
 impl Roulette {
@@ -138,7 +141,7 @@ impl Techniques {
             let axis = lobe.frame().z;
             let weight = luminance(vertex.factor(w_eye, axis)) * vertex.cos_ng(axis);
             if weight > 0.0 {
-                lobes.push(lobe.with_weight(weight));
+                lobes.push(lobe.with_weight(weight).with_equal_range(roulette.range));
             }
         }
         if let Some(albedo) = vertex.bsdf.diffuse_base() {

@@ -7,7 +7,7 @@ use hrr::integrator::Size;
 use hrr::material::Material;
 use hrr::math::Spectrum;
 use hrr::scene::Scene;
-use hrr::settings::{Backend, Integrator, Settings};
+use hrr::settings::{Backend, Integrator, MinimumRule, Range, Settings};
 use hrr::subpath::World;
 
 /// Many small iterations, each with its own numbers: `seed` sets integrators apart, so that their noise is independent.
@@ -197,6 +197,34 @@ fn the_roulette_agrees_on_the_caustic_mirror() {
         let hrr = run(&scene, Integrator::LvcHrr, 2, 64, 4);
         let sure = hrr.assert_agrees_where_sure(&lvc, noise, alpha);
         assert!(sure >= least, "only {sure} blocks have converged");
+    }
+}
+
+/// Every shape of range and source of numbers, on lobes round and stretched, of reflection and of transmission.
+#[test]
+fn ranges_and_numbers_of_the_roulette_agree() {
+    let scene = scenes::box_of_everything();
+    let numerics = |seed: u64, range: Range, minimum: MinimumRule| {
+        let settings = Settings {
+            integrator: Integrator::LvcHrr,
+            seed,
+            visibility: Backend::BEST,
+            iterations: 64,
+            samples: 8,
+            max_depth: 8,
+            range,
+            minimum,
+            ..Settings::default()
+        };
+        estimate(&scene, &settings, 8)
+    };
+    let default = numerics(1, Range::Ellipsoid, MinimumRule::Nested);
+    let ranges = [Range::Spheroid, Range::Sphere].map(|range| (range, MinimumRule::Nested));
+    let rules = MinimumRule::ALL.into_iter().skip(1).map(|rule| (Range::Ellipsoid, rule));
+    let both = [(Range::Spheroid, MinimumRule::Pregenerated)];
+    for (seed, (range, minimum)) in ranges.into_iter().chain(rules).chain(both).enumerate() {
+        let names = format!("{range}, {minimum}");
+        numerics(2 + seed as u64, range, minimum).assert_agrees(&default, 0.02, &names);
     }
 }
 

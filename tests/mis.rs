@@ -12,7 +12,7 @@ use hrr::math::Spectrum;
 use hrr::mis::Heuristic;
 use hrr::sampler::{Purpose, Sampler, Stream};
 use hrr::scene::Scene;
-use hrr::settings::{Backend, Settings};
+use hrr::settings::{Backend, Range, Settings};
 use hrr::subpath::walk::Start;
 use hrr::subpath::{Origin, Role, Storing, Total, Vertex, Walk, World};
 use hrr::techniques::{Merging, Roulette, Techniques};
@@ -26,7 +26,12 @@ const TECHNIQUES: Techniques = Techniques {
     next_event: 1.0,
     light_image: 700.0,
     base: 1.7,
-    roulette: Some(Roulette { light_subpaths: 1400.0, constant: 0.02, max_alpha: 0.3 }),
+    roulette: Some(Roulette {
+        light_subpaths: 1400.0,
+        constant: 0.02,
+        max_alpha: 0.3,
+        range: Range::Ellipsoid,
+    }),
     merging: Some(Merging { light_subpaths: 1400.0, radius: 0.01 }),
     storing: Storing { share: 0.3, max_alpha: 0.22, lamps: false },
     guide: None,
@@ -235,6 +240,17 @@ fn recursion_equals_the_definition_with_textures() {
     let mut scene = scenes::box_of_textures();
     scene.materials[0] = scenes::box_of_everything().materials[7].clone();
     check_guided(&scene, Heuristic::Balance);
+}
+
+#[test]
+fn recursion_equals_the_definition_with_every_range() {
+    let scene = scenes::box_of_everything();
+    let settings = Settings { visibility: Backend::Obvhs, ..Settings::default() };
+    let world = World::new(&scene, &settings).unwrap();
+    for range in [Range::Spheroid, Range::Sphere] {
+        let roulette = TECHNIQUES.roulette.map(|roulette| Roulette { range, ..roulette });
+        check(&world, &Techniques { roulette, ..TECHNIQUES });
+    }
 }
 
 fn check_guided(scene: &Scene, heuristic: Heuristic) {

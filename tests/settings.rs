@@ -1,6 +1,8 @@
 //! The settings table, the struct behind it and its TOML are one thing.
 
-use hrr::settings::{Backend, Heuristic, Integrator, Kind, Setting, Settings, Switch, TABLE};
+use hrr::settings::{
+    Backend, Heuristic, Integrator, Kind, MinimumRule, Range, Setting, Settings, Switch, TABLE,
+};
 
 /// A value of each setting that is not its default. A new setting has no entry here yet: the tests say so.
 fn other_value(name: &str) -> &'static str {
@@ -13,6 +15,8 @@ fn other_value(name: &str) -> &'static str {
         "light_subpaths" => "1234",
         "connections" => "3",
         "expected" => "0.25",
+        "range" => "spheroid",
+        "minimum" => "exact",
         "storing" => "0.5",
         "guiding" => "off",
         "mis" => "power",
@@ -64,6 +68,8 @@ fn every_field_has_its_row() {
         connections,
         expected,
         hrr_alpha,
+        range,
+        minimum,
         storing,
         guiding,
         adaptive,
@@ -79,9 +85,10 @@ fn every_field_has_its_row() {
     assert_eq!((iterations, first_iteration, time, seed), (9, 64, Some(30.5), i64::MAX as u64));
     assert_eq!(error, Some(0.25));
     assert_eq!((threads, memory, expected, hrr_alpha, mis), (2, 3.5, 0.25, 0.125, Heuristic::Power));
+    assert_eq!((range, minimum), (Range::Spheroid, MinimumRule::Exact));
     assert_eq!((merge_radius, merge_pixels, merge_shrink), (0.5, 5.0, 1.0));
     assert_eq!((reused_subpaths, record_spacing), (50, 4));
-    assert_eq!((storing, guiding, adaptive, TABLE.len()), (0.5, Switch::Off, Switch::Off, 26));
+    assert_eq!((storing, guiding, adaptive, TABLE.len()), (0.5, Switch::Off, Switch::Off, 28));
     assert_eq!((with.to_string(), without.to_string()), ("sds".into(), "caustics,lens".into()));
 }
 

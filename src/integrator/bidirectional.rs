@@ -10,7 +10,8 @@ use crate::error::Result;
 use crate::film::Film;
 use crate::light_cache::LightCache;
 use crate::material::Material;
-use crate::sampler::Stream;
+use crate::roulette::{MinimumRandom, Pregenerated};
+use crate::sampler::{Purpose, Sampler, Stream};
 use crate::settings::{Settings, Switch};
 use crate::subpath::{Origin, Storing, World};
 use crate::tally::Tally;
@@ -38,6 +39,8 @@ pub struct Bidirectional<'a> {
     /// All vertices of the first light subpaths, for uniform picks, where `cache` has not got them all.
     pub(super) picks: LightCache,
     pub(super) bvh: VertexBvh,
+    /// The roulette's numbers for `bvh`, where all queries share them.
+    pub(super) numbers: Option<Pregenerated>,
     pub(super) records: Records,
     adaptive: Option<Adaptive>,
 }
@@ -56,6 +59,7 @@ impl<'a> Bidirectional<'a> {
             cache: LightCache::default(),
             picks: LightCache::default(),
             bvh: VertexBvh::new(),
+            numbers: None,
             records: Records::default(),
             adaptive: None,
         };
@@ -71,6 +75,17 @@ impl<'a> Bidirectional<'a> {
             !bsdf.is_delta() && rule.origin(&bsdf) == Origin::Narrow
         };
         !self.world.scene.materials.iter().any(glossy)
+    }
+
+    /// Makes the tree over the cache's vertices, and the numbers of the stream's iteration that its queries share.
+    pub(super) fn build_tree(&mut self, stream: Stream, iteration: u64) -> Result<()> {
+        self.bvh.build(self.cache.positions())?;
+        let shared = self.recipe.roulette && MinimumRandom::of(self.settings.minimum).is_none();
+        self.numbers = shared.then(|| {
+            let sampler = Sampler::new(self.settings.seed, iteration, stream, 0);
+            Pregenerated::new(&self.bvh, sampler.bits(0, Purpose::Roulette))
+        });
+        Ok(())
     }
 
     /// Sets how often each technique tries, per eye sample.
@@ -109,6 +124,7 @@ impl<'a> Bidirectional<'a> {
                 light_subpaths: n_l / eye_samples,
                 constant: self.settings.expected * self.world.scene.mesh.total_area() / vertices,
                 max_alpha: self.settings.hrr_alpha,
+                range: self.settings.range,
             }),
         };
     }
@@ -149,7 +165,7 @@ impl Integrator for Bidirectional<'_> {
         let mut tally = self.light_pass(Stream::Light, iteration, Some(film), &on_light_side);
         if self.recipe.roulette || self.recipe.merging {
             let build = Instant::now();
-            self.bvh.build(self.cache.positions())?;
+            self.build_tree(Stream::Light, iteration)?;
             tally.vertex_bvh_build += build.elapsed().as_secs_f64();
         }
         if self.recipe.base == Base::Probabilistic {
@@ -171,6 +187,7 @@ impl Integrator for Bidirectional<'_> {
     }
 
     fn bytes(&self) -> (usize, usize) {
-        (self.cache.bytes() + self.picks.bytes() + self.records.bytes(), self.bvh.bytes())
+        let tree = self.bvh.bytes() + self.numbers.as_ref().map_or(0, Pregenerated::bytes);
+        (self.cache.bytes() + self.picks.bytes() + self.records.bytes(), tree)
     }
 }

@@ -6,7 +6,7 @@ use super::spread::Seen;
 use super::tile::Sample;
 use crate::connect::{EyeVertex, Onward};
 use crate::math::Spectrum;
-use crate::roulette::{self, Query};
+use crate::roulette::{self, MinimumRandom, Query};
 use crate::sampler::{Purpose, Sampler};
 use crate::subpath::Walk;
 use crate::tally::{Clock, Tally};
@@ -150,7 +150,11 @@ impl Bidirectional<'_> {
         let depth = vertex.walk.depth;
         let position = vertex.walk.vertex.point.position;
         let key = sampler.bits(depth, Purpose::Roulette);
-        let query = Query::new(position, &vertex.lobes, roulette.constant, key);
+        let query = Query {
+            rule: MinimumRandom::of(self.settings.minimum).unwrap_or_default(),
+            pregenerated: self.numbers.as_ref(),
+            ..Query::new(position, &vertex.lobes, roulette.constant, key)
+        };
         let mut kept = Vec::new();
         let Tally { roulette: counters, roulette_seconds, .. } = tally;
         clock.time(roulette_seconds, || {

@@ -5,7 +5,7 @@ mod choices;
 mod effects;
 mod table;
 
-pub use choices::{Backend, Heuristic, Integrator, Switch};
+pub use choices::{Backend, Heuristic, Integrator, MinimumRule, Range, Switch};
 pub use effects::{Effect, EffectSet};
 pub use table::TABLE;
 
@@ -49,6 +49,10 @@ pub struct Settings {
     pub expected: f64,
     /// Largest GGX roughness at which the roulette is used.
     pub hrr_alpha: f64,
+    /// Shape of the roulette's ranges.
+    pub range: Range,
+    /// Where the roulette's random numbers come from.
+    pub minimum: MinimumRule,
     /// Probability of storing a light vertex whose predecessor does not scatter narrowly, where the roulette plays.
     pub storing: f64,
     /// Whether light subpaths are sent where earlier ones proved useful to the roulette.
@@ -89,6 +93,8 @@ impl Default for Settings {
             connections: 1,
             expected: 1.0,
             hrr_alpha: 0.3,
+            range: Range::Ellipsoid,
+            minimum: MinimumRule::Nested,
             storing: 0.05,
             guiding: Switch::On,
             adaptive: Switch::On,

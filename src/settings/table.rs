@@ -1,6 +1,6 @@
 //! One row for every setting.
 
-use super::{Backend, Heuristic, Integrator, Kind, Setting, Switch};
+use super::{Backend, Heuristic, Integrator, Kind, MinimumRule, Range, Setting, Switch};
 
 const TRANSPORT: &str = "Light transport";
 const BUDGET: &str = "Budget and randomness";
@@ -119,6 +119,38 @@ pub const TABLE: &[Setting] = &[
         heading: TRANSPORT,
         help: "Largest GGX roughness at which the roulette is used",
         doc: "",
+    },
+    Setting {
+        name: "range",
+        kind: Kind::Choice {
+            names: &Range::NAMES,
+            planned: &[],
+            get: |s| s.range as usize,
+            set: |s, i| s.range = Range::ALL[i],
+        },
+        default: "ellipsoid",
+        value_name: "NAME",
+        heading: TRANSPORT,
+        help: "Shape of the range in which the roulette (+hrr) keeps light vertices",
+        doc: "ellipsoid: as the lobe of the surface is. spheroid: round about the axis, as wide as the lobe's wider side. \
+              sphere: the same in all directions. All keep about as many light vertices for a value of expected; the \
+              simpler ones, for comparison, keep the wrong ones more often.",
+    },
+    Setting {
+        name: "minimum",
+        kind: Kind::Choice {
+            names: &MinimumRule::NAMES,
+            planned: &[],
+            get: |s| s.minimum as usize,
+            set: |s, i| s.minimum = MinimumRule::ALL[i],
+        },
+        default: "nested",
+        value_name: "NAME",
+        heading: TRANSPORT,
+        help: "Where the roulette (+hrr) has its random numbers from, whose minimum below a node it must know",
+        doc: "nested: dealt on the way down, children of a node in a stratum each. semi-stratified: the paper's rule. \
+              exact: the true minimum of independent numbers. pregenerated: one number for each light vertex and \
+              iteration, shared by all queries, as in stochastic light culling. The last three are for comparison.",
     },
     Setting {
         name: "storing",
