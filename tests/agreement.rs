@@ -7,7 +7,7 @@ use hrr::integrator::Size;
 use hrr::material::Material;
 use hrr::math::Spectrum;
 use hrr::scene::Scene;
-use hrr::settings::{Backend, Integrator, MinimumRule, Range, Settings};
+use hrr::settings::{Backend, Integrator, Settings};
 use hrr::subpath::World;
 
 /// Many small iterations, each with its own numbers: `seed` sets integrators apart, so that their noise is independent.
@@ -200,31 +200,36 @@ fn the_roulette_agrees_on_the_caustic_mirror() {
     }
 }
 
-/// Every shape of range and source of numbers, on lobes round and stretched, of reflection and of transmission.
+/// Every choice of the roulette's numerics, on lobes round and stretched, of reflection and of transmission.
 #[test]
-fn ranges_and_numbers_of_the_roulette_agree() {
+fn the_numerics_of_the_roulette_agree() {
     let scene = scenes::box_of_everything();
-    let numerics = |seed: u64, range: Range, minimum: MinimumRule| {
-        let settings = Settings {
+    let run = |seed: u64, changes: &[(&str, &str)]| {
+        let mut settings = Settings {
             integrator: Integrator::LvcHrr,
             seed,
             visibility: Backend::BEST,
-            iterations: 64,
             samples: 8,
             max_depth: 8,
-            range,
-            minimum,
             ..Settings::default()
         };
+        changes.iter().for_each(|(name, value)| settings.set(name, value).unwrap());
         estimate(&scene, &settings, 8)
     };
-    let default = numerics(1, Range::Ellipsoid, MinimumRule::Nested);
-    let ranges = [Range::Spheroid, Range::Sphere].map(|range| (range, MinimumRule::Nested));
-    let rules = MinimumRule::ALL.into_iter().skip(1).map(|rule| (Range::Ellipsoid, rule));
-    let both = [(Range::Spheroid, MinimumRule::Pregenerated)];
-    for (seed, (range, minimum)) in ranges.into_iter().chain(rules).chain(both).enumerate() {
-        let names = format!("{range}, {minimum}");
-        numerics(2 + seed as u64, range, minimum).assert_agrees(&default, 0.02, &names);
+    let default = run(1, &[]);
+    let others: &[&[(&str, &str)]] = &[
+        &[("range", "spheroid")],
+        &[("range", "sphere")],
+        &[("minimum", "semi-stratified")],
+        &[("minimum", "exact")],
+        &[("minimum", "pregenerated")],
+        &[("range", "spheroid"), ("minimum", "pregenerated"), ("mis", "power")],
+        &[("lobe_widening", "0"), ("lobe_floor", "0.1")],
+        &[("node_padding", "1000"), ("lobe_precision", "rebased")],
+        &[("lobe_precision", "f32")],
+    ];
+    for (seed, changes) in others.iter().enumerate() {
+        run(2 + seed as u64, changes).assert_agrees(&default, 0.02, &format!("{changes:?}"));
     }
 }
 

@@ -12,10 +12,11 @@ use hrr::math::Spectrum;
 use hrr::mis::Heuristic;
 use hrr::sampler::{Purpose, Sampler, Stream};
 use hrr::scene::Scene;
-use hrr::settings::{Backend, Range, Settings};
+use hrr::roulette::{LobePrecision, Range};
+use hrr::settings::{Backend, Settings};
 use hrr::subpath::walk::Start;
 use hrr::subpath::{Origin, Role, Storing, Total, Vertex, Walk, World};
-use hrr::techniques::{Merging, Roulette, Techniques};
+use hrr::techniques::{Merging, Numerics, Roulette, Techniques};
 use hrr::visibility::offset;
 use std::sync::Arc;
 
@@ -30,7 +31,7 @@ const TECHNIQUES: Techniques = Techniques {
         light_subpaths: 1400.0,
         constant: 0.02,
         max_alpha: 0.3,
-        range: Range::Ellipsoid,
+        numerics: Numerics::DEFAULT,
     }),
     merging: Some(Merging { light_subpaths: 1400.0, radius: 0.01 }),
     storing: Storing { share: 0.3, max_alpha: 0.22, lamps: false },
@@ -243,12 +244,19 @@ fn recursion_equals_the_definition_with_textures() {
 }
 
 #[test]
-fn recursion_equals_the_definition_with_every_range() {
+fn recursion_equals_the_definition_with_other_numerics() {
     let scene = scenes::box_of_everything();
     let settings = Settings { visibility: Backend::Obvhs, ..Settings::default() };
     let world = World::new(&scene, &settings).unwrap();
-    for range in [Range::Spheroid, Range::Sphere] {
-        let roulette = TECHNIQUES.roulette.map(|roulette| Roulette { range, ..roulette });
+    let default = Numerics::DEFAULT;
+    for numerics in [
+        Numerics { range: Range::Spheroid, ..default },
+        Numerics { range: Range::Sphere, ..default },
+        Numerics { widening: 0.0, floor: 0.1, ..default },
+        Numerics { precision: LobePrecision::Rebased, ..default },
+        Numerics { precision: LobePrecision::F32, ..default },
+    ] {
+        let roulette = TECHNIQUES.roulette.map(|roulette| Roulette { numerics, ..roulette });
         check(&world, &Techniques { roulette, ..TECHNIQUES });
     }
 }

@@ -1,7 +1,8 @@
 //! The settings table, the struct behind it and its TOML are one thing.
 
 use hrr::settings::{
-    Backend, Heuristic, Integrator, Kind, MinimumRule, Range, Setting, Settings, Switch, TABLE,
+    Backend, EmbreeBuild, Heuristic, Integrator, Kind, LobePrecision, MinimumRule, Range, Setting, Settings,
+    Switch, TABLE,
 };
 
 /// A value of each setting that is not its default. A new setting has no entry here yet: the tests say so.
@@ -17,6 +18,12 @@ fn other_value(name: &str) -> &'static str {
         "expected" => "0.25",
         "range" => "spheroid",
         "minimum" => "exact",
+        "lobe_precision" => "f32",
+        "lobe_widening" => "2.0",
+        "lobe_floor" => "0.125",
+        "node_padding" => "8.0",
+        "embree_robust" => "off",
+        "embree_build" => "low",
         "storing" => "0.5",
         "guiding" => "off",
         "mis" => "power",
@@ -70,6 +77,12 @@ fn every_field_has_its_row() {
         hrr_alpha,
         range,
         minimum,
+        lobe_precision,
+        lobe_widening,
+        lobe_floor,
+        node_padding,
+        embree_robust,
+        embree_build,
         storing,
         guiding,
         adaptive,
@@ -86,9 +99,11 @@ fn every_field_has_its_row() {
     assert_eq!(error, Some(0.25));
     assert_eq!((threads, memory, expected, hrr_alpha, mis), (2, 3.5, 0.25, 0.125, Heuristic::Power));
     assert_eq!((range, minimum), (Range::Spheroid, MinimumRule::Exact));
+    assert_eq!((lobe_precision, lobe_widening, lobe_floor), (LobePrecision::F32, 2.0, 0.125));
+    assert_eq!((node_padding, embree_robust, embree_build), (8.0, Switch::Off, EmbreeBuild::Low));
     assert_eq!((merge_radius, merge_pixels, merge_shrink), (0.5, 5.0, 1.0));
     assert_eq!((reused_subpaths, record_spacing), (50, 4));
-    assert_eq!((storing, guiding, adaptive, TABLE.len()), (0.5, Switch::Off, Switch::Off, 28));
+    assert_eq!((storing, guiding, adaptive, TABLE.len()), (0.5, Switch::Off, Switch::Off, 34));
     assert_eq!((with.to_string(), without.to_string()), ("sds".into(), "caustics,lens".into()));
 }
 

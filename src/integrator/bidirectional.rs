@@ -15,7 +15,7 @@ use crate::sampler::{Purpose, Sampler, Stream};
 use crate::settings::{Settings, Switch};
 use crate::subpath::{Origin, Storing, World};
 use crate::tally::Tally;
-use crate::techniques::{Merging, Roulette, Techniques};
+use crate::techniques::{Merging, Numerics, Roulette, Techniques};
 use crate::vertex_bvh::VertexBvh;
 use glam::DVec2;
 use std::time::Instant;
@@ -124,7 +124,7 @@ impl<'a> Bidirectional<'a> {
                 light_subpaths: n_l / eye_samples,
                 constant: self.settings.expected * self.world.scene.mesh.total_area() / vertices,
                 max_alpha: self.settings.hrr_alpha,
-                range: self.settings.range,
+                numerics: Numerics::of(self.settings),
             }),
         };
     }

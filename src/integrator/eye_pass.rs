@@ -153,6 +153,8 @@ impl Bidirectional<'_> {
         let query = Query {
             rule: MinimumRandom::of(self.settings.minimum).unwrap_or_default(),
             pregenerated: self.numbers.as_ref(),
+            precision: roulette.numerics.precision,
+            padding: self.settings.node_padding as f32,
             ..Query::new(position, &vertex.lobes, roulette.constant, key)
         };
         let mut kept = Vec::new();

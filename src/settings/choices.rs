@@ -138,6 +138,32 @@ choice! {
 }
 
 choice! {
+    /// The arithmetic in which the roulette computes the probability of a light vertex.
+    #[derive(Default)]
+    LobePrecision, "lobe_precision", lobe_precision {
+        /// Double precision throughout.
+        #[default]
+        F64 = "f64",
+        /// The offset from eye to light vertex in double precision, all after that in single.
+        Rebased = "rebased",
+        /// Single precision throughout, the eye vertex's position included.
+        F32 = "f32",
+    }
+}
+
+choice! {
+    /// How much time Embree takes to build its tree.
+    EmbreeBuild, "embree_build", embree_build {
+        /// With the surface area heuristic, and triangles that are cut where that helps.
+        High = "high",
+        /// With the surface area heuristic.
+        Medium = "medium",
+        /// By the order of a space-filling curve.
+        Low = "low",
+    }
+}
+
+choice! {
     /// Whether something is done.
     Switch, "guiding", guiding {
         /// It is not.
@@ -158,6 +184,8 @@ mod tests {
         assert!(Switch::ALL.iter().all(|v| v.to_string().parse() == Ok(*v)));
         assert!(Heuristic::ALL.iter().all(|v| v.to_string().parse() == Ok(*v)));
         assert!(Range::ALL.iter().all(|v| v.to_string().parse() == Ok(*v)));
+        assert!(LobePrecision::ALL.iter().all(|v| v.to_string().parse() == Ok(*v)));
+        assert!(EmbreeBuild::ALL.iter().all(|v| v.to_string().parse() == Ok(*v)));
         assert!(MinimumRule::ALL.iter().all(|v| v.to_string().parse() == Ok(*v)));
         assert_eq!("lvc+hrr".parse(), Ok(Integrator::LvcHrr));
         assert_eq!("brute".parse(), Ok(Backend::Brute));
