@@ -75,7 +75,7 @@ pub struct Numerics {
     pub range: Range,
     /// Factor on how much lobes are widened at grazing angles.
     pub widening: f64,
-    /// Weight of an even lobe under each, as a share of that one's.
+    /// Weight of an even lobe under that of reflection, as a share of it; not where light passes.
     pub floor: f64,
     /// Arithmetic of the probabilities.
     pub precision: LobePrecision,
@@ -105,11 +105,11 @@ impl Roulette {
     }
 }
 
-/// The roulette's lobes at a vertex: of reflection, and of transmission where light passes, or of a diffuse base; and the
-/// floor under them.
+/// The roulette's lobes at a vertex: of reflection, and of transmission where light passes, or else of a diffuse base and
+/// the floor under reflection. (There are no more than two, for what is copied with every eye vertex.)
 #[derive(Debug, Clone, Copy)]
 pub struct Lobes {
-    list: [Lobe; 3],
+    list: [Lobe; 2],
     count: usize,
     /// The vertex.
     position: DVec3,
@@ -117,7 +117,7 @@ pub struct Lobes {
 
 impl Lobes {
     /// Where the roulette is off.
-    pub const NONE: Self = Self { list: [Lobe::NONE; 3], count: 0, position: DVec3::ZERO };
+    pub const NONE: Self = Self { list: [Lobe::NONE; 2], count: 0, position: DVec3::ZERO };
 
     fn push(&mut self, lobe: Lobe) {
         self.list[self.count] = lobe;
@@ -187,7 +187,7 @@ impl Techniques {
             // Half of the greatest value of f cos, the mean over the hemisphere.
             even += 0.5 * FRAC_1_PI * luminance(albedo);
         }
-        if even > 0.0 {
+        if even > 0.0 && lobes.count < lobes.list.len() {
             lobes.push(Lobe::sphere(even));
         }
         lobes

@@ -10,9 +10,9 @@ use hrr::light::distant::DistantPoint;
 use hrr::light::{EmissionGuide, LightPoint};
 use hrr::math::Spectrum;
 use hrr::mis::Heuristic;
+use hrr::roulette::Range;
 use hrr::sampler::{Purpose, Sampler, Stream};
 use hrr::scene::Scene;
-use hrr::roulette::{LobePrecision, Range};
 use hrr::settings::{Backend, Settings};
 use hrr::subpath::walk::Start;
 use hrr::subpath::{Origin, Role, Storing, Total, Vertex, Walk, World};
@@ -253,8 +253,6 @@ fn recursion_equals_the_definition_with_other_numerics() {
         Numerics { range: Range::Spheroid, ..default },
         Numerics { range: Range::Sphere, ..default },
         Numerics { widening: 0.0, floor: 0.1, ..default },
-        Numerics { precision: LobePrecision::Rebased, ..default },
-        Numerics { precision: LobePrecision::F32, ..default },
     ] {
         let roulette = TECHNIQUES.roulette.map(|roulette| Roulette { numerics, ..roulette });
         check(&world, &Techniques { roulette, ..TECHNIQUES });

@@ -275,8 +275,7 @@ mod tests {
                 let theta = (lo + (f64::from(i) + 0.5) * width).exp();
                 let ring = (0..sectors).map(|j| {
                     let phi = (f64::from(j) + 0.5) / f64::from(sectors) * std::f64::consts::TAU;
-                    let local =
-                        DVec3::new(theta.sin() * phi.cos(), theta.sin() * phi.sin(), theta.cos());
+                    let local = DVec3::new(theta.sin() * phi.cos(), theta.sin() * phi.sin(), theta.cos());
                     lobe.weight() / lobe.h2(lobe.frame().to_world(local))
                 });
                 let mean = ring.sum::<f64>() / f64::from(sectors);

@@ -5,9 +5,7 @@ mod choices;
 mod effects;
 mod table;
 
-pub use choices::{
-    Backend, EmbreeBuild, Heuristic, Integrator, LobePrecision, MinimumRule, Range, Switch,
-};
+pub use choices::{Backend, EmbreeBuild, Heuristic, Integrator, LobePrecision, MinimumRule, Range, Switch};
 pub use effects::{Effect, EffectSet};
 pub use table::TABLE;
 
@@ -63,7 +61,7 @@ pub struct Settings {
     pub lobe_precision: LobePrecision,
     /// How much the roulette's lobes are widened where the mirrored lobe is not that of one normal; 1: as suits.
     pub lobe_widening: f64,
-    /// Weight of an even lobe under each of the roulette's, as a share of that one's.
+    /// Weight of an even lobe under the roulette's lobe of reflection, as a share of it.
     pub lobe_floor: f64,
     /// How far the roulette's boxes are grown, over what covers the roundings of their tests.
     pub node_padding: f64,

@@ -185,17 +185,13 @@ pub const TABLE: &[Setting] = &[
     },
     Setting {
         name: "lobe_floor",
-        kind: Kind::Real {
-            min: 0.0,
-            max: 1.0,
-            get: |s| Some(s.lobe_floor),
-            set: |s, v| s.lobe_floor = v,
-        },
+        kind: Kind::Real { min: 0.0, max: 1.0, get: |s| Some(s.lobe_floor), set: |s, v| s.lobe_floor = v },
         default: "0.0",
         value_name: "SHARE",
         heading: TRANSPORT,
-        help: "Share of each lobe's light vertices that the roulette (+hrr) also keeps from all directions",
-        doc: "A floor under the lobe for what its model misses of the surface's tails: fewer bright spots, more vertices.",
+        help: "Share of a lobe's light vertices that the roulette (+hrr) also keeps from all directions",
+        doc: "A floor under the lobe for what its model misses of the surface's tails: fewer bright spots, more vertices. Not \
+              at surfaces that transmit.",
     },
     Setting {
         name: "node_padding",

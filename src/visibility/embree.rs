@@ -373,8 +373,7 @@ impl Scene {
         // SAFETY: the device is live.
         let scene = Self(unsafe { sys::rtcNewScene(device.0) });
         device.check("making a scene")?;
-        let flags =
-            if options.embree_robust { sys::RTC_SCENE_FLAG_ROBUST } else { sys::RTC_SCENE_FLAG_NONE };
+        let flags = if options.embree_robust { sys::RTC_SCENE_FLAG_ROBUST } else { sys::RTC_SCENE_FLAG_NONE };
         // SAFETY: both are live. Robust: no ray slips between two triangles that share an edge.
         unsafe { sys::rtcSetSceneFlags(scene.0, flags) };
         let quality = match options.embree_build {
