@@ -4,8 +4,9 @@ use crate::bsdf::Transport;
 use crate::light::{EmissionGuide, LightPoint};
 use crate::math::luminance;
 use crate::mis::Heuristic;
-use crate::roulette::{self, Lobe};
+use crate::roulette::{Lobe, LobePrecision, Range, probability, probability_in};
 use crate::sampler::Sampler;
+use crate::settings::Settings;
 use crate::subpath::walk::{Rules, Walk};
 use crate::subpath::{Role, Storing, Total, Vertex, World, from_light};
 use glam::DVec3;
@@ -68,12 +69,44 @@ pub struct Roulette {
     pub most: f64,
     /// Largest GGX roughness at which it plays.
     pub max_alpha: f64,
+    /// How lobes are made and judged.
+    pub numerics: Numerics,
+}
+
+/// How the roulette's lobes are made and judged: part of P, and so of the query and of every weight.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Numerics {
+    /// Shape of the ranges.
+    pub range: Range,
+    /// Factor on how much lobes are widened at grazing angles.
+    pub widening: f64,
+    /// Weight of an even lobe under that of reflection, as a share of it; not where light passes.
+    pub floor: f64,
+    /// Arithmetic of the probabilities.
+    pub precision: LobePrecision,
+}
+
+impl Numerics {
+    /// What the default settings say.
+    pub const DEFAULT: Self =
+        Self { range: Range::Ellipsoid, widening: 1.0, floor: 0.0, precision: LobePrecision::F64 };
+
+    /// What settings say.
+    pub fn of(settings: &Settings) -> Self {
+        Self {
+            range: settings.range,
+            widening: settings.lobe_widening,
+            floor: settings.lobe_floor,
+            precision: settings.lobe_precision,
+        }
+    }
 }
 
 impl Roulette {
     /// m_s of an edge with this offset (light - eye).
-    pub fn density(&self, lobes: &[Lobe], offset: DVec3) -> f64 {
-        self.light_subpaths * roulette::probability(lobes, self.constant, offset)
+    pub fn density(&self, lobes: &Lobes, offset: DVec3) -> f64 {
+        let precision = self.numerics.precision;
+        self.light_subpaths * probability_in(precision, lobes, self.constant, lobes.position, offset)
     }
 }
 
@@ -92,21 +125,24 @@ impl EmitterRoulette {
     /// Its part of m_1, for a point at an offset (light - eye): about as many different points as the samples of a pixel
     /// keep, for each of them.
     pub fn density(&self, lobes: &[Lobe], offset: DVec3) -> f64 {
-        let p = roulette::probability(lobes, self.constant, offset);
+        let p = probability(lobes, self.constant, offset);
         self.points * p / (1.0 + (self.samples - 1.0) * p)
     }
 }
 
-/// The roulette's lobes at a vertex: of reflection, and of transmission where light passes, or of a diffuse base.
+/// The roulette's lobes at a vertex: of reflection, and of transmission where light passes, or else of a diffuse base and
+/// the floor under reflection. (There are no more than two, for what is copied with every eye vertex.)
 #[derive(Debug, Clone, Copy)]
 pub struct Lobes {
     list: [Lobe; 2],
     count: usize,
+    /// The vertex.
+    position: DVec3,
 }
 
 impl Lobes {
     /// Where the roulette is off.
-    pub const NONE: Self = Self { list: [Lobe::NONE; 2], count: 0 };
+    pub const NONE: Self = Self { list: [Lobe::NONE; 2], count: 0, position: DVec3::ZERO };
 
     fn push(&mut self, lobe: Lobe) {
         self.list[self.count] = lobe;
@@ -151,6 +187,7 @@ impl Techniques {
     pub fn lobes(&self, vertex: &Vertex, w_eye: DVec3) -> Lobes {
         let mut lobes = Lobes::NONE;
         let (Some(roulette), Some(glossy)) = (&self.roulette, vertex.bsdf.glossy()) else { return lobes };
+        let Numerics { range, widening, floor, .. } = roulette.numerics;
         let (alpha_x, alpha_y) = (glossy.alpha_x, glossy.alpha_y);
         if alpha_x.max(alpha_y) > roulette.max_alpha {
             return lobes;
@@ -161,23 +198,31 @@ impl Techniques {
         if !outside {
             (frame.x, frame.z) = (-frame.x, -frame.z);
         }
-        let reflected = Lobe::from_ggx_reflection(&frame, w_eye, alpha_x, alpha_y, 1.0);
+        lobes.position = vertex.point.position;
+        let alpha = (alpha_x, alpha_y);
+        let reflected = Lobe::from_ggx_reflection_widened(&frame, w_eye, alpha, 1.0, widening);
         let transmitted = glossy.eta.map(|eta| {
             let eta = if outside { eta } else { 1.0 / eta };
-            Lobe::from_ggx_transmission(&frame, w_eye, alpha_x, alpha_y, eta, 1.0)
+            Lobe::from_ggx_transmission_widened(&frame, w_eye, alpha, eta, 1.0, widening)
         });
         let axes = [Some(reflected), transmitted];
+        let mut even = 0.0;
         for lobe in axes.into_iter().flatten() {
             // Without a weight nothing would ever be kept, though there may be light beside the axis.
             let axis = lobe.frame().z;
             let weight = luminance(vertex.factor(w_eye, axis)) * vertex.cos_ng(axis);
             if weight > 0.0 {
-                lobes.push(lobe.with_weight(weight));
+                let lobe = lobe.with_weight(weight);
+                even += floor * lobe.with_equal_range(Range::Sphere).weight();
+                lobes.push(lobe.with_equal_range(range));
             }
         }
         if let Some(albedo) = vertex.bsdf.diffuse_base() {
             // Half of the greatest value of f cos, the mean over the hemisphere.
-            lobes.push(Lobe::sphere(0.5 * FRAC_1_PI * luminance(albedo)));
+            even += 0.5 * FRAC_1_PI * luminance(albedo);
+        }
+        if even > 0.0 && lobes.count < lobes.list.len() {
+            lobes.push(Lobe::sphere(even));
         }
         lobes.limit(roulette.most / roulette.constant);
         lobes

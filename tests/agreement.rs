@@ -251,6 +251,39 @@ fn emitter_vertices_keep_the_mean() {
     }
 }
 
+/// Every choice of the roulette's numerics, on lobes round and stretched, of reflection and of transmission.
+#[test]
+fn the_numerics_of_the_roulette_agree() {
+    let scene = scenes::box_of_everything();
+    let run = |seed: u64, changes: &[(&str, &str)]| {
+        let mut settings = Settings {
+            integrator: Integrator::LvcHrr,
+            seed,
+            visibility: Backend::BEST,
+            samples: 8,
+            max_depth: 8,
+            ..Settings::default()
+        };
+        changes.iter().for_each(|(name, value)| settings.set(name, value).unwrap());
+        estimate(&scene, &settings, 8)
+    };
+    let default = run(1, &[]);
+    let others: &[&[(&str, &str)]] = &[
+        &[("range", "spheroid")],
+        &[("range", "sphere")],
+        &[("minimum", "semi-stratified")],
+        &[("minimum", "exact")],
+        &[("minimum", "pregenerated")],
+        &[("range", "spheroid"), ("minimum", "pregenerated"), ("mis", "power")],
+        &[("lobe_widening", "0"), ("lobe_floor", "0.1")],
+        &[("node_padding", "1000"), ("lobe_precision", "rebased")],
+        &[("lobe_precision", "f32")],
+    ];
+    for (seed, changes) in others.iter().enumerate() {
+        run(2 + seed as u64, changes).assert_agrees(&default, 0.02, &format!("{changes:?}"));
+    }
+}
+
 #[test]
 fn backends_agree() {
     let scene = cornell();

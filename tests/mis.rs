@@ -10,13 +10,13 @@ use hrr::light::distant::DistantPoint;
 use hrr::light::{EmissionGuide, LightPoint};
 use hrr::math::Spectrum;
 use hrr::mis::Heuristic;
-use hrr::roulette::probability;
+use hrr::roulette::{Range, probability};
 use hrr::sampler::{Purpose, Sampler, Stream};
 use hrr::scene::Scene;
 use hrr::settings::{Backend, Settings};
 use hrr::subpath::walk::Start;
 use hrr::subpath::{Origin, Role, Storing, Total, Vertex, Walk, World};
-use hrr::techniques::{EmitterRoulette, Merging, Roulette, Techniques};
+use hrr::techniques::{EmitterRoulette, Merging, Numerics, Roulette, Techniques};
 use hrr::visibility::offset;
 use std::sync::Arc;
 
@@ -28,7 +28,13 @@ const TECHNIQUES: Techniques = Techniques {
     light_image: 700.0,
     base: 1.7,
     emitters: Some(EmitterRoulette { points: 230.0, samples: 3.0, constant: 0.03 }),
-    roulette: Some(Roulette { light_subpaths: 1400.0, constant: 0.02, most: 0.1, max_alpha: 0.3 }),
+    roulette: Some(Roulette {
+        light_subpaths: 1400.0,
+        constant: 0.02,
+        most: 0.1,
+        max_alpha: 0.3,
+        numerics: Numerics::DEFAULT,
+    }),
     merging: Some(Merging { light_subpaths: 1400.0, radius: 0.01 }),
     storing: Storing { share: 0.3, max_alpha: 0.22, lamps: false },
     guide: None,
@@ -251,6 +257,22 @@ fn recursion_equals_the_definition_with_textures() {
     let mut scene = scenes::box_of_textures();
     scene.materials[0] = scenes::box_of_everything().materials[7].clone();
     check_guided(&scene, Heuristic::Balance);
+}
+
+#[test]
+fn recursion_equals_the_definition_with_other_numerics() {
+    let scene = scenes::box_of_everything();
+    let settings = Settings { visibility: Backend::Obvhs, ..Settings::default() };
+    let world = World::new(&scene, &settings).unwrap();
+    let default = Numerics::DEFAULT;
+    for numerics in [
+        Numerics { range: Range::Spheroid, ..default },
+        Numerics { range: Range::Sphere, ..default },
+        Numerics { widening: 0.0, floor: 0.1, ..default },
+    ] {
+        let roulette = TECHNIQUES.roulette.map(|roulette| Roulette { numerics, ..roulette });
+        check(&world, &Techniques { roulette, ..TECHNIQUES });
+    }
 }
 
 fn check_guided(scene: &Scene, heuristic: Heuristic) {

@@ -1,7 +1,8 @@
 //! The settings table, the struct behind it and its TOML are one thing.
 
 use hrr::settings::{
-    Backend, EmitterVertices, Heuristic, Integrator, Kind, Setting, Settings, Switch, TABLE,
+    Backend, EmbreeBuild, EmitterVertices, Heuristic, Integrator, Kind, LobePrecision, MinimumRule, Range,
+    Setting, Settings, Switch, TABLE,
 };
 
 /// A value of each setting that is not its default. A new setting has no entry here yet: the tests say so.
@@ -17,6 +18,14 @@ fn other_value(name: &str) -> &'static str {
         "expected" => "0.25",
         "axis_probability" => "2.5",
         "emitters" => "on",
+        "range" => "spheroid",
+        "minimum" => "exact",
+        "lobe_precision" => "f32",
+        "lobe_widening" => "2.0",
+        "lobe_floor" => "0.125",
+        "node_padding" => "8.0",
+        "embree_robust" => "off",
+        "embree_build" => "low",
         "storing" => "0.5",
         "guiding" => "off",
         "mis" => "power",
@@ -69,6 +78,14 @@ fn every_field_has_its_row() {
         expected,
         axis_probability,
         hrr_alpha,
+        range,
+        minimum,
+        lobe_precision,
+        lobe_widening,
+        lobe_floor,
+        node_padding,
+        embree_robust,
+        embree_build,
         storing,
         emitters,
         guiding,
@@ -85,9 +102,12 @@ fn every_field_has_its_row() {
     assert_eq!((iterations, first_iteration, time, seed), (9, 64, Some(30.5), i64::MAX as u64));
     assert_eq!(error, Some(0.25));
     assert_eq!((threads, memory, expected, hrr_alpha, mis), (2, 3.5, 0.25, 0.125, Heuristic::Power));
+    assert_eq!((range, minimum), (Range::Spheroid, MinimumRule::Exact));
+    assert_eq!((lobe_precision, lobe_widening, lobe_floor), (LobePrecision::F32, 2.0, 0.125));
+    assert_eq!((node_padding, embree_robust, embree_build), (8.0, Switch::Off, EmbreeBuild::Low));
     assert_eq!((merge_radius, merge_pixels, merge_shrink), (0.5, 5.0, 1.0));
     assert_eq!((reused_subpaths, record_spacing), (50, 4));
-    assert_eq!((storing, guiding, adaptive, TABLE.len()), (0.5, Switch::Off, Switch::Off, 28));
+    assert_eq!((storing, guiding, adaptive, TABLE.len()), (0.5, Switch::Off, Switch::Off, 36));
     assert_eq!((axis_probability, emitters), (Some(2.5), EmitterVertices::On));
     assert_eq!((with.to_string(), without.to_string()), ("sds".into(), "caustics,lens".into()));
 }

@@ -29,6 +29,19 @@ fn cost_writes_a_report_that_can_be_drawn_again_and_works_in_a_browser() {
     let (code, again, err) = place.run("cost --replot study/results.csv -o study");
     assert_eq!((code, &again), (0, &out), "{err}");
     assert_eq!(fs::read_to_string(place.path("study/report.html")).unwrap(), html);
+    let markdown = fs::read_to_string(place.path("study/report.md")).unwrap();
+    assert!(
+        markdown.contains("| lvc+hrr | 4 x ") && markdown.contains("![lvc+hrr](lvc+hrr.png)"),
+        "{markdown}"
+    );
+    for name in ["curves", "pareto", "stages"] {
+        let svg = fs::read_to_string(place.path(&format!("study/{name}.svg"))).unwrap();
+        assert!(
+            svg.starts_with("<svg xmlns=")
+                && svg.contains("<style>")
+                && markdown.contains(&format!("({name}.svg)"))
+        );
+    }
     in_a_browser(&place, &html);
 
     let (code, _, err) = place.run("cost --replot scene.toml -o study");
@@ -60,7 +73,9 @@ fn in_a_browser(place: &Place, html: &str) {
         html.replace("</head>", &format!("{before}</head>")).replace("</body>", &format!("{after}</body>"));
     fs::write(place.path("seen.html"), page).unwrap();
     let output = Command::new(browser)
-        .args(["--headless", "--no-sandbox", "--disable-gpu", "--virtual-time-budget=5000", "--dump-dom"])
+        .args(["--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run"])
+        .args(["--disable-background-networking", "--disable-component-update", "--disable-sync"])
+        .args(["--virtual-time-budget=5000", "--dump-dom"])
         .arg(format!("--user-data-dir={}", place.path("profile").display()))
         .arg(format!("file://{}", place.path("seen.html").display()))
         .output()
@@ -69,6 +84,25 @@ fn in_a_browser(place: &Place, html: &str) {
     let seen = dom.split("data-seen=\"").nth(1).and_then(|s| s.split('"').next());
     let seen = seen.unwrap_or_else(|| panic!("no answer: {}", String::from_utf8_lossy(&output.stderr)));
     assert_eq!(seen, "0|5|true|true|inset(0px 20% 0px 0px)|true|24|true");
+}
+
+#[test]
+fn cost_compares_the_values_it_is_told() {
+    let place = Place::new();
+    let line = "cost scene.toml -o study --quick --runs 4 --seconds 2 --size 12x8 --integrator lvc+hrr \
+                --sweep range=spheroid,sphere --sweep minimum=pregenerated";
+    let (code, _, err) = place.run(line);
+    assert_eq!(code, 0, "{err}");
+    let results = Results::read(&place.path("study/results.csv")).unwrap();
+    let names = results.settings();
+    assert_eq!(names[0], "lvc+hrr");
+    assert_eq!(names[names.len() - 3..], ["range=spheroid", "range=sphere", "minimum=pregenerated"]);
+    assert!(results.rows.iter().all(|r| (0.0..=1.0).contains(&r.flip)));
+    if cfg!(unix) {
+        assert!(results.rows.iter().all(|r| r.cpu.is_some_and(|s| s > 0.0)));
+    }
+    let (code, _, err) = place.run("cost scene.toml -o study --sweep range=cube");
+    assert!(code == 2 && err.contains("one of ellipsoid, spheroid, sphere"), "{code} {err}");
 }
 
 #[test]
@@ -114,7 +148,7 @@ fn predictions_come_true() {
             },
             biased: false,
         });
-        let study = study::run(scene, &contenders, 16, 4.0, None, &|_| true).unwrap();
+        let study = study::run(scene, &contenders, 16, 4.0, None, 0.0, &|_| true).unwrap();
         for curve in curves(&Results { about: Vec::new(), rows: study.rows }) {
             let p = curve.prediction.unwrap();
             cases += 1;

@@ -10,7 +10,7 @@ use hrr::roulette::{Lobe, Query, QueryCounters, probability, query};
 use hrr::sampler::{Family, Purpose, Sampler, Stream};
 use hrr::settings::{Backend, EmitterVertices, Integrator, Settings};
 use hrr::subpath::World;
-use hrr::techniques::{Lobes, Roulette, Techniques};
+use hrr::techniques::{Lobes, Numerics, Roulette, Techniques};
 use hrr::vertex_bvh::VertexBvh;
 use std::f64::consts::PI;
 
@@ -18,7 +18,8 @@ use std::f64::consts::PI;
 const PROBABILITIES: [f64; 3] = [0.02, 1.0, 4.0];
 
 fn with_roulette(constant: f64, most: f64) -> Techniques {
-    let roulette = Some(Roulette { light_subpaths: 1.0, constant, most, max_alpha: 0.3 });
+    let numerics = Numerics::DEFAULT;
+    let roulette = Some(Roulette { light_subpaths: 1.0, constant, most, max_alpha: 0.3, numerics });
     Techniques { roulette, ..Techniques::none(Heuristic::Balance) }
 }
 

@@ -10,11 +10,12 @@ use crate::error::Result;
 use crate::film::Film;
 use crate::light_cache::LightCache;
 use crate::material::Material;
-use crate::sampler::Stream;
+use crate::roulette::{MinimumRandom, Pregenerated};
+use crate::sampler::{Purpose, Sampler, Stream};
 use crate::settings::{Settings, Switch};
 use crate::subpath::{Origin, Storing, World};
 use crate::tally::Tally;
-use crate::techniques::{Merging, Roulette, Techniques};
+use crate::techniques::{Merging, Numerics, Roulette, Techniques};
 use crate::vertex_bvh::VertexBvh;
 use glam::DVec2;
 use std::f64::consts::PI;
@@ -40,6 +41,8 @@ pub struct Bidirectional<'a> {
     pub(super) picks: LightCache,
     pub(super) bvh: VertexBvh,
     pub(super) emitters: EmitterPoints,
+    /// The roulette's numbers for `bvh`, where all queries share them.
+    pub(super) numbers: Option<Pregenerated>,
     pub(super) records: Records,
     pub(super) adaptive: Option<Adaptive>,
     /// When iterations should be over.
@@ -61,6 +64,7 @@ impl<'a> Bidirectional<'a> {
             picks: LightCache::default(),
             bvh: VertexBvh::new(),
             emitters: EmitterPoints::default(),
+            numbers: None,
             records: Records::default(),
             adaptive: None,
             deadline: None,
@@ -77,6 +81,17 @@ impl<'a> Bidirectional<'a> {
             !bsdf.is_delta() && rule.origin(&bsdf) == Origin::Narrow
         };
         !self.world.scene.materials.iter().any(glossy)
+    }
+
+    /// Makes the tree over the cache's vertices, and the numbers of the stream's iteration that its queries share.
+    pub(super) fn build_tree(&mut self, stream: Stream, iteration: u64) -> Result<()> {
+        self.bvh.build(self.cache.positions())?;
+        let shared = self.recipe.roulette && MinimumRandom::of(self.settings.minimum).is_none();
+        self.numbers = shared.then(|| {
+            let sampler = Sampler::new(self.settings.seed, iteration, stream, 0);
+            Pregenerated::new(&self.bvh, sampler.bits(0, Purpose::Roulette))
+        });
+        Ok(())
     }
 
     /// Sets how often each technique tries, per eye sample.
@@ -119,6 +134,7 @@ impl<'a> Bidirectional<'a> {
                 // On the axis of lobes of weight c, C c / d^2 is then at most X at d^2 = A / 4 pi.
                 most: self.settings.axis_probability.map_or(f64::INFINITY, |x| x * area / (4.0 * PI)),
                 max_alpha: self.settings.hrr_alpha,
+                numerics: Numerics::of(self.settings),
             }),
         };
         self.techniques.emitters = self.plan_emitters();
@@ -164,7 +180,7 @@ impl Integrator for Bidirectional<'_> {
         let mut tally = self.light_pass(Stream::Light, iteration, Some(film), &on_light_side);
         if self.recipe.roulette || self.recipe.merging {
             let build = Instant::now();
-            self.bvh.build(self.cache.positions())?;
+            self.build_tree(Stream::Light, iteration)?;
             tally.vertex_bvh_build += build.elapsed().as_secs_f64();
         }
         self.draw_emitters(iteration)?;
@@ -180,6 +196,7 @@ impl Integrator for Bidirectional<'_> {
     fn bytes(&self) -> (usize, usize) {
         let (points, tree) = self.emitters.bytes();
         let caches = self.cache.bytes() + self.picks.bytes() + self.records.bytes();
-        (caches + points, self.bvh.bytes() + tree)
+        let numbers = self.numbers.as_ref().map_or(0, Pregenerated::bytes);
+        (caches + points, self.bvh.bytes() + numbers + tree)
     }
 }

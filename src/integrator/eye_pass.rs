@@ -9,7 +9,7 @@ use super::tile::{self, Sample};
 use crate::connect::{EyeVertex, Onward};
 use crate::film::Film;
 use crate::math::Spectrum;
-use crate::roulette::{self, Query};
+use crate::roulette::{self, MinimumRandom, Query};
 use crate::sampler::{Purpose, Sampler};
 use crate::subpath::Walk;
 use crate::tally::{Clock, Tally};
@@ -194,7 +194,13 @@ impl Bidirectional<'_> {
         let depth = vertex.walk.depth;
         let position = vertex.walk.vertex.point.position;
         let key = sampler.bits(depth, Purpose::Roulette);
-        let query = Query::new(position, &vertex.lobes, roulette.constant, key);
+        let query = Query {
+            rule: MinimumRandom::of(self.settings.minimum).unwrap_or_default(),
+            pregenerated: self.numbers.as_ref(),
+            precision: roulette.numerics.precision,
+            padding: self.settings.node_padding as f32,
+            ..Query::new(position, &vertex.lobes, roulette.constant, key)
+        };
         let mut kept = Vec::new();
         let Tally { roulette: counters, roulette_seconds, .. } = tally;
         clock.time(roulette_seconds, || {

@@ -19,7 +19,10 @@ pub struct Line {
 }
 
 const WIDTH: f64 = 760.0;
+/// At least; more where the legend needs it.
 const HEIGHT: f64 = 430.0;
+/// Of a line of the legend.
+const LEGEND: f64 = 18.0;
 /// Left, right, top, bottom.
 const MARGIN: [f64; 4] = [70.0, 170.0, 14.0, 48.0];
 
@@ -33,12 +36,13 @@ pub fn log_log(id: &str, lines: &[Line], labels: [&str; 2], joined: bool) -> Str
         if low <= high { (low / 1.25, high * 1.25) } else { (0.1, 10.0) }
     };
     let (x, y) = (range(&mut all().map(|p| p[0])), range(&mut all().flat_map(|p| [p[1], p[3]])));
+    let height = HEIGHT.max(MARGIN[2] + LEGEND * lines.len() as f64 + 12.0);
     let share =
         |v: f64, (low, high): (f64, f64)| ((v.max(low) / low).ln() / (high / low).ln()).clamp(0.0, 1.0);
     let at_x = |v: f64| MARGIN[0] + (WIDTH - MARGIN[0] - MARGIN[1]) * share(v, x);
-    let at_y = |v: f64| HEIGHT - MARGIN[3] - (HEIGHT - MARGIN[2] - MARGIN[3]) * share(v, y);
-    let mut s = format!("<svg id=\"{id}\" viewBox=\"0 0 {WIDTH} {HEIGHT}\" role=\"img\">\n");
-    let (bottom, right) = (HEIGHT - MARGIN[3], WIDTH - MARGIN[1]);
+    let at_y = |v: f64| height - MARGIN[3] - (height - MARGIN[2] - MARGIN[3]) * share(v, y);
+    let mut s = format!("<svg id=\"{id}\" viewBox=\"0 0 {WIDTH} {height}\" role=\"img\">\n");
+    let (bottom, right) = (height - MARGIN[3], WIDTH - MARGIN[1]);
     for (ticks, horizontal) in [(ticks(x), true), (ticks(y), false)] {
         for (value, text) in ticks {
             let _ = if horizontal {
@@ -65,13 +69,16 @@ pub fn log_log(id: &str, lines: &[Line], labels: [&str; 2], joined: bool) -> Str
         s,
         "<text x=\"{:.0}\" y=\"{:.0}\" text-anchor=\"middle\">{}</text><text transform=\"translate(16 {:.0}) rotate(-90)\" text-anchor=\"middle\">{}</text>",
         (MARGIN[0] + right) / 2.0,
-        HEIGHT - 9.0,
+        height - 9.0,
         labels[0],
         (MARGIN[2] + bottom) / 2.0,
         labels[1]
     );
     for (i, line) in lines.iter().enumerate() {
-        let colour = COLOURS[i % COLOURS.len()];
+        let (colour, round) = (COLOURS[i % COLOURS.len()], i / COLOURS.len());
+        let dashes = ["", " stroke-dasharray=\"7 4\"", " stroke-dasharray=\"2 3\""][round.min(2)];
+        // Later rounds of the colours have hollow marks.
+        let fill = if round == 0 { colour } else { "#fff" };
         let points: Vec<[f64; 4]> =
             line.points.iter().copied().filter(|p| p[0] > 0.0 && p[1] > 0.0).collect();
         let pair = |x: f64, y: f64| format!("{:.1},{:.1}", at_x(x), at_y(y));
@@ -83,7 +90,7 @@ pub fn log_log(id: &str, lines: &[Line], labels: [&str; 2], joined: bool) -> Str
             let _ = writeln!(s, "<polygon class=\"band\" fill=\"{colour}\" points=\"{}\"/>", band.join(" "));
             let _ = writeln!(
                 s,
-                "<polyline class=\"curve\" data-name=\"{}\" stroke=\"{colour}\" points=\"{}\"/>",
+                "<polyline class=\"curve\" data-name=\"{}\" stroke=\"{colour}\"{dashes} points=\"{}\"/>",
                 line.name,
                 path.join(" ")
             );
@@ -92,7 +99,7 @@ pub fn log_log(id: &str, lines: &[Line], labels: [&str; 2], joined: bool) -> Str
             let (cx, cy) = (at_x(p[0]), at_y(p[1]));
             let _ = writeln!(
                 s,
-                "<line stroke=\"{colour}\" x1=\"{cx:.1}\" x2=\"{cx:.1}\" y1=\"{:.1}\" y2=\"{:.1}\"/><circle fill=\"{colour}\" cx=\"{cx:.1}\" cy=\"{cy:.1}\" r=\"3.2\"/>",
+                "<line stroke=\"{colour}\" x1=\"{cx:.1}\" x2=\"{cx:.1}\" y1=\"{:.1}\" y2=\"{:.1}\"/><circle fill=\"{fill}\" stroke=\"{colour}\" cx=\"{cx:.1}\" cy=\"{cy:.1}\" r=\"3.2\"/>",
                 at_y(p[2]),
                 at_y(p[3])
             );
@@ -106,10 +113,10 @@ pub fn log_log(id: &str, lines: &[Line], labels: [&str; 2], joined: bool) -> Str
                 cy - 5.0
             );
         }
-        let y = MARGIN[2] + 12.0 + 18.0 * i as f64;
+        let y = MARGIN[2] + 12.0 + LEGEND * i as f64;
         let _ = writeln!(
             s,
-            "<rect fill=\"{colour}\" x=\"{}\" y=\"{:.0}\" width=\"12\" height=\"12\"/><text x=\"{}\" y=\"{:.0}\">{}</text>",
+            "<rect fill=\"{fill}\" stroke=\"{colour}\" x=\"{}\" y=\"{:.0}\" width=\"11\" height=\"11\"/><text x=\"{}\" y=\"{:.0}\">{}</text>",
             right + 14.0,
             y - 10.0,
             right + 31.0,
@@ -118,6 +125,19 @@ pub fn log_log(id: &str, lines: &[Line], labels: [&str; 2], joined: bool) -> Str
         );
     }
     s + "</svg>\n"
+}
+
+/// How a chart's parts look.
+pub const STYLE: &str = "svg text{font-size:12px;fill:#333}.grid{stroke:#e4e4e4}.band{opacity:.16}\
+.curve{fill:none;stroke-width:2}.mark{fill:none;stroke-width:2}";
+
+/// A chart as a file of its own.
+pub fn file(svg: &str) -> String {
+    let head = format!(
+        "<svg xmlns=\"http://www.w3.org/2000/svg\" font-family=\"sans-serif\" style=\"background:#fff\" ",
+    );
+    let svg = svg.replacen("<svg ", &head, 1);
+    svg.replacen(">\n", &format!("><style>{STYLE}</style>\n"), 1)
 }
 
 /// Powers of ten, and where these are few, twice and five times them.

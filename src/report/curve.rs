@@ -1,5 +1,6 @@
 //! What a study's rows say: error against time with intervals, time to unit variance, and what could have been predicted.
 
+use super::blur::Blur;
 use super::bootstrap::Interval;
 use super::results::{Results, Row};
 use crate::math::relative::median;
@@ -46,8 +47,14 @@ pub struct Curve {
     pub unit: Interval,
     /// That of the first setting over it: how many times as fast this one is.
     pub speedup: Interval,
-    /// From all rungs but the longest; `None` for settings that blur, and when there are fewer than three.
+    /// From the rungs below the longest; `None` when there are too few: two for noise, four for blur.
     pub prediction: Option<Prediction>,
+    /// Noise and blur of a setting that blurs, from all rungs.
+    pub blur: Option<Blur>,
+    /// Median FLIP at the longest rung.
+    pub flip: f64,
+    /// Median processor seconds of the longest rung.
+    pub cpu: Option<f64>,
     /// Mean seconds of each stage at the longest rung, summed over threads.
     pub stages: [f64; 5],
     /// Mean fireflies at the longest rung.
@@ -94,6 +101,11 @@ impl<'a> Table<'a> {
     fn unit(&self, runs: &[usize]) -> f64 {
         let last = self.rungs.len() - 1;
         self.mean(last, runs, |r| r.square).max(0.0) * self.seconds(last, runs)
+    }
+
+    /// Iterations and square errors of the rungs below one.
+    fn points(&self, below: usize, runs: &[usize]) -> Vec<(f64, f64)> {
+        (0..below).map(|k| (self.rungs[k].0 as f64, self.mean(k, runs, |r| r.square))).collect()
     }
 
     /// The line through the rungs below the longest, at most [`FITTED`]: intercept and slope of the logarithm of the
@@ -143,7 +155,19 @@ fn curve(name: &str, table: &Table<'_>, first: &Table<'_>) -> Curve {
         unit: Interval::new(n, |runs| table.unit(runs)),
         // Runs with the same number were interleaved: the machine was as busy.
         speedup: Interval::new(n.min(first.runs), |runs| first.unit(runs) / table.unit(runs)),
-        prediction: (!biased && rungs.len() >= 3).then(|| predict(table, &rungs)),
+        prediction: if biased {
+            predict_blur(table, &rungs)
+        } else {
+            (rungs.len() >= 3).then(|| predict(table, &rungs))
+        },
+        blur: biased.then(|| Blur::fit(&table.points(rungs.len(), &all))).flatten(),
+        flip: median(&mut table.rungs[last].1.iter().map(|r| r.flip).collect::<Vec<_>>()),
+        cpu: table.rungs[last]
+            .1
+            .iter()
+            .map(|r| r.cpu)
+            .collect::<Option<Vec<_>>>()
+            .map(|mut s| median(&mut s)),
         stages: std::array::from_fn(|s| table.mean(last, &all, |r| r.stages[s])),
         fireflies: table.mean(last, &all, |r| r.fireflies as f64),
         rungs,
@@ -151,26 +175,54 @@ fn curve(name: &str, table: &Table<'_>, first: &Table<'_>) -> Curve {
 }
 
 fn predict(table: &Table<'_>, rungs: &[Rung]) -> Prediction {
+    let all: Vec<usize> = (0..table.runs).collect();
+    let iterations = rungs[rungs.len() - 1].iterations as f64;
+    let (intercept, slope) = table.fit(&all);
+    extrapolate(
+        table,
+        rungs,
+        |runs| {
+            let (intercept, slope) = table.fit(runs);
+            (intercept + slope * iterations.ln()).exp()
+        },
+        |square| ((square.ln() - intercept) / slope).exp(),
+    )
+}
+
+fn predict_blur(table: &Table<'_>, rungs: &[Rung]) -> Option<Prediction> {
+    let last = rungs.len() - 1;
+    let all: Vec<usize> = (0..table.runs).collect();
+    let fitted = Blur::fit(&table.points(last, &all))?;
+    let iterations = rungs[last].iterations as f64;
+    let predicted = |runs: &[usize]| {
+        Blur::fit(&table.points(last, runs)).map_or(f64::NAN, |blur| blur.square(iterations))
+    };
+    Some(extrapolate(table, rungs, predicted, |square| fitted.iterations_to(square)))
+}
+
+/// The longest rung as a model says: `predicted`, its square error from some runs; `needed`, iterations to a square error.
+fn extrapolate(
+    table: &Table<'_>,
+    rungs: &[Rung],
+    predicted: impl Fn(&[usize]) -> f64,
+    needed: impl Fn(f64) -> f64,
+) -> Prediction {
     let (n, last) = (table.runs, rungs.len() - 1);
     let all: Vec<usize> = (0..n).collect();
-    let iterations = rungs[last].iterations as f64;
     let below = last - 1;
     let level = table.mean(below, &all, |r| r.square);
     let error = Interval::new(n, |runs| {
         // What is measured is a mean of as many runs, and errs as much: others, shifted by half.
         let others: Vec<usize> = runs.iter().rev().map(|r| (r * 7 + 3) % n).collect();
         let chance = if runs == all { 1.0 } else { table.mean(below, &others, |r| r.square) / level };
-        let (intercept, slope) = table.fit(runs);
-        ((intercept + slope * iterations.ln()).exp() * chance).max(0.0).sqrt()
+        (predicted(runs) * chance).max(0.0).sqrt()
     });
     let measured = rungs[last].error.value;
     let setup = median(&mut table.rungs[below].1.iter().map(|r| r.setup).collect::<Vec<_>>());
     let per_iteration = (rungs[below].seconds - setup) / rungs[below].iterations as f64;
-    let (intercept, slope) = table.fit(&all);
-    let needed = ((2.0 * measured.max(f64::MIN_POSITIVE).ln() - intercept) / slope).exp();
     Prediction {
         error,
-        seconds: setup + per_iteration * needed,
+        seconds: setup + per_iteration * needed(measured.powi(2).max(f64::MIN_POSITIVE)),
         measured,
         measured_seconds: rungs[last].seconds,
     }
@@ -194,6 +246,8 @@ mod tests {
                     iterations: n,
                     seconds: 0.5 + seconds * n as f64,
                     setup: 0.5,
+                    cpu: Some(1.5),
+                    flip: 0.25,
                     square: variance / n as f64 * (0.8 + 0.4 * u),
                     fireflies: 1,
                     stages: [1.0, 2.0, 3.0, 4.0, 5.0],
@@ -209,6 +263,7 @@ mod tests {
         let found = curves(&Results { about: Vec::new(), rows: both });
         let [a, b] = &found[..] else { panic!() };
         assert_eq!((a.runs, a.rungs.len(), a.stages[4], a.fireflies), (16, 5, 5.0, 1.0));
+        assert_eq!((a.flip, a.cpu, a.blur), (0.25, Some(1.5), None));
         assert!((a.unit.value - 16.5 / 16.0).abs() < 0.1 && a.unit.low < a.unit.value);
         assert!(b.speedup.holds(2.0) && !b.is_unresolved(), "{b:?}");
         assert!(a.is_unresolved());
@@ -219,6 +274,22 @@ mod tests {
         };
         let unresolved = (0..60).filter(|&key| equal(key)).count();
         assert!((45..60).contains(&unresolved), "{unresolved} of 60");
+    }
+
+    #[test]
+    fn blur_is_told_from_noise_and_extrapolated() {
+        let mut blurred = rows("vcm", 1.0, 1.0, 7);
+        for row in &mut blurred {
+            row.biased = true;
+            row.square += 0.2 * (row.iterations as f64).powf(-0.5);
+        }
+        let curve = &curves(&Results { about: Vec::new(), rows: blurred })[0];
+        let blur = curve.blur.unwrap();
+        // How the two share what few rungs show is open; their sum is not.
+        assert!((blur.square(16.0) / (1.0 / 16.0 + 0.05) - 1.0).abs() < 0.05, "{blur:?}");
+        assert!(blur.blur > 0.0 && blur.overtakes() < 1000.0, "{blur:?}");
+        let p = curve.prediction.as_ref().unwrap();
+        assert!(p.error.holds(p.measured) && (p.seconds / p.measured_seconds - 1.0).abs() < 0.25, "{p:?}");
     }
 
     #[test]

@@ -7,6 +7,8 @@ pub mod bootstrap;
 pub mod backends;
 pub mod study;
 pub mod results;
+pub mod blur;
 pub mod curve;
 pub mod chart;
 pub mod page;
+pub mod markdown;

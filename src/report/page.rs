@@ -20,8 +20,7 @@ const STYLE: &str = "\
 body{font:16px/1.5 system-ui,sans-serif;max-width:860px;margin:2em auto;padding:0 1em;color:#1c1c1c;background:#fff}\
 h1{font-size:1.6em}h2{font-size:1.2em;margin-top:2em}table{border-collapse:collapse;font-size:.9em}\
 td,th{padding:.3em .7em;border-bottom:1px solid #ddd;text-align:right}td:first-child,th:first-child{text-align:left}\
-svg{width:100%;height:auto}svg text{font-size:12px;fill:#333}.grid{stroke:#e4e4e4}.band{opacity:.16}\
-.curve{fill:none;stroke-width:2}.mark{fill:none;stroke-width:2}.lead li{margin:.4em 0}\
+svg{width:100%;height:auto}.lead li{margin:.4em 0}\
 #slider{position:relative;width:100%;max-width:720px;line-height:0}#slider img{width:100%;image-rendering:pixelated}\
 #front{position:absolute;inset:0;clip-path:inset(0 50% 0 0)}#map{width:100%;max-width:720px;image-rendering:pixelated}\
 input[type=range]{width:100%;max-width:720px}.about{font-size:.85em;color:#444;overflow-wrap:anywhere}";
@@ -38,29 +37,19 @@ pub fn page(results: &Results, curves: &[Curve], pictures: Option<&Pictures>) ->
     let title = format!("What accuracy costs: {}", escape(about("scene")));
     let mut s = format!(
         "<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><meta name=\"viewport\" \
-         content=\"width=device-width\"><title>{title}</title><style>{STYLE}</style></head><body>\n<h1>{title}</h1>\n<ul \
-         class=\"lead\">\n"
+         content=\"width=device-width\"><title>{title}</title><style>{STYLE}{}</style></head><body>\n<h1>{title}</h1>\n<ul \
+         class=\"lead\">\n",
+        chart::STYLE
     );
     for sentence in sentences(curves) {
         let _ = writeln!(s, "<li>{}</li>", escape(&sentence));
     }
-    s += "</ul>\n<p>Error: the root of the mean square difference from the reference, each pixel's relative to the brightness \
-          of the 16 x 16 pixels around it, the worst thousandth of the pixels left out. Intervals hold the truth with 90 % \
-          confidence.</p>\n";
+    let _ = writeln!(s, "</ul>\n<p>{EXPLANATION}</p>");
     s += "<h2>Settings</h2>\n";
     s += &table(curves);
-    s += "<h2>Error against time</h2>\n<p>Lower is better. Noise halves in four times the time: a slope of -1/2. A cross is what \
-          the shorter runs predicted for the longest.</p>\n";
-    let lines: Vec<Line> = curves.iter().map(line).collect();
-    s += &chart::log_log("curves", &lines, ["seconds", "error"], true);
-    s += "<h2>Time of an iteration against its noise</h2>\n<p>Lower left is better. Settings along a falling diagonal are \
-          equally efficient.</p>\n";
-    let points: Vec<Line> = curves.iter().map(point).collect();
-    s += &chart::log_log("pareto", &points, ["seconds per iteration", "error after one iteration"], false);
-    s += "<h2>Where the time goes</h2>\n";
-    let stages: Vec<(String, Vec<f64>)> =
-        curves.iter().map(|c| (escape(&c.name), c.stages.to_vec())).collect();
-    s += &chart::bars("stages", &STAGES, &stages);
+    for figure in figures(curves) {
+        let _ = writeln!(s, "<h2>{}</h2>\n<p>{}</p>\n{}", figure.title, figure.text, figure.svg);
+    }
     if let Some(pictures) = pictures {
         s += &slider(pictures);
     }
@@ -79,6 +68,58 @@ pub fn page(results: &Results, curves: &[Curve], pictures: Option<&Pictures>) ->
           DIR</code> draws this page again.</p>\n<script>{SCRIPT}</script></body></html>"
     );
     s
+}
+
+/// What the numbers are.
+pub(super) const EXPLANATION: &str = "Error: the root of the mean square difference from the reference, each pixel's \
+    relative to the brightness of the 16 x 16 pixels around it, the worst thousandth of the pixels left out. Speed: how many \
+    times as fast as the first setting to an equal error. Intervals hold the truth with 90 % confidence.";
+
+/// A chart with what is said about it.
+#[derive(Debug, Clone)]
+pub struct Figure {
+    /// Name, as of a file.
+    pub name: &'static str,
+    /// Heading.
+    pub title: &'static str,
+    /// How to read it.
+    pub text: &'static str,
+    /// The chart, for a page of HTML; [`chart::file`] makes a file of it.
+    pub svg: String,
+}
+
+/// The charts of a study.
+pub fn figures(curves: &[Curve]) -> Vec<Figure> {
+    let lines: Vec<Line> = curves.iter().map(line).collect();
+    let points: Vec<Line> = curves.iter().map(point).collect();
+    let stages: Vec<(String, Vec<f64>)> =
+        curves.iter().map(|c| (escape(&c.name), c.stages.to_vec())).collect();
+    vec![
+        Figure {
+            name: "curves",
+            title: "Error against time",
+            text: "Lower is better. Noise halves in four times the time: a slope of -1/2. A cross is what the shorter runs \
+                   predicted for the longest.",
+            svg: chart::log_log("curves", &lines, ["seconds", "error"], true),
+        },
+        Figure {
+            name: "pareto",
+            title: "Time of an iteration against its noise",
+            text: "Lower left is better. Settings along a falling diagonal are equally efficient.",
+            svg: chart::log_log(
+                "pareto",
+                &points,
+                ["seconds per iteration", "error after one iteration"],
+                false,
+            ),
+        },
+        Figure {
+            name: "stages",
+            title: "Where the time goes",
+            text: "Each bar is the time of one setting, all threads together.",
+            svg: chart::bars("stages", &STAGES, &stages),
+        },
+    ]
 }
 
 /// What the study says, in words.
@@ -135,52 +176,80 @@ pub fn sentences(curves: &[Curve]) -> Vec<String> {
         ));
     }
     if curves.iter().any(|c| c.biased) {
-        said.push("Settings with vertex merging blur: their error holds blur as well as noise, and is not extrapolated.".into());
+        said.push("Settings with vertex merging blur: their error holds blur as well as noise.".into());
+        said.extend(curves.iter().filter_map(|c| Some((c, c.blur?))).map(|(c, blur)| {
+            let square = |part: f64| percent(part.sqrt());
+            if blur.blur == 0.0 {
+                return format!("Of {}'s error no blur is seen beside the noise.", c.name);
+            }
+            format!(
+                "{}: noise of {} and blur of {} in the first iteration; the blur's square falls as n^-{:.2}, and outweighs \
+                 the noise from {} iterations on.",
+                c.name,
+                square(blur.noise),
+                square(blur.blur),
+                blur.exponent,
+                number(blur.overtakes().max(1.0))
+            )
+        }));
     }
     said
 }
 
-fn table(curves: &[Curve]) -> String {
-    let mut s = "<table id=\"settings\"><tr><th>setting</th><th>runs x iterations</th><th>seconds</th><th>error</th><th>seconds \
-                 to 1 %</th><th>speed</th><th>predicted</th><th>fireflies</th></tr>\n"
-        .to_owned();
+/// Heads of the columns of [`cells`].
+pub(super) const COLUMNS: [&str; 10] = [
+    "setting",
+    "runs x iterations",
+    "seconds",
+    "processor",
+    "error",
+    "seconds to 1 %",
+    "speed",
+    "predicted",
+    "FLIP",
+    "fireflies",
+];
+
+/// The table: a line for each setting.
+pub(super) fn cells(curves: &[Curve]) -> Vec<[String; COLUMNS.len()]> {
+    let spread = |value: f64, low: f64, high: f64, text: &dyn Fn(f64) -> String| {
+        format!("{} ({} to {})", text(value), text(low), text(high))
+    };
+    let mut lines = Vec::new();
     for c in curves {
         let Some(last) = c.rungs.last() else { continue };
-        let e = last.error;
-        let predicted = c.prediction.as_ref().map_or("-".to_owned(), |p| {
-            format!("{} ({} to {})", percent(p.error.value), percent(p.error.low), percent(p.error.high))
-        });
-        let unit = if c.biased {
-            "-".to_owned()
-        } else {
-            format!(
-                "{} ({} to {})",
-                number(c.unit.value * 1e4),
-                number(c.unit.low * 1e4),
-                number(c.unit.high * 1e4)
-            )
-        };
-        let speed = if c.name == curves[0].name {
-            "1".to_owned()
-        } else if c.is_unresolved() {
-            "not resolved".to_owned()
-        } else {
-            format!("x {} ({} to {})", number(c.speedup.value), number(c.speedup.low), number(c.speedup.high))
-        };
-        let _ = writeln!(
-            s,
-            "<tr><td>{}</td><td>{} x {}</td><td>{}</td><td>{} ({} to {})</td><td>{unit}</td><td>{speed}</td><td>{predicted}</td><td>{}</td></tr>",
-            escape(&c.name),
-            c.runs,
-            last.iterations,
+        let (e, u, s) = (last.error, c.unit, c.speedup);
+        lines.push([
+            c.name.clone(),
+            format!("{} x {}", c.runs, last.iterations),
             number(last.seconds),
-            percent(e.value),
-            percent(e.low),
-            percent(e.high),
-            number(c.fireflies)
-        );
+            c.cpu.map_or("-".to_owned(), number),
+            spread(e.value, e.low, e.high, &percent),
+            if c.biased { "-".to_owned() } else { spread(u.value * 1e4, u.low * 1e4, u.high * 1e4, &number) },
+            if c.name == curves[0].name {
+                "1".to_owned()
+            } else if c.is_unresolved() {
+                "not resolved".to_owned()
+            } else {
+                format!("x {}", spread(s.value, s.low, s.high, &number))
+            },
+            c.prediction
+                .as_ref()
+                .map_or("-".to_owned(), |p| spread(p.error.value, p.error.low, p.error.high, &percent)),
+            number(c.flip),
+            number(c.fireflies),
+        ]);
     }
-    s + "</table>\n"
+    lines
+}
+
+fn table(curves: &[Curve]) -> String {
+    let row = |tag: &str, cells: &[String]| {
+        let cells: String = cells.iter().map(|c| format!("<{tag}>{}</{tag}>", escape(c))).collect();
+        format!("<tr>{cells}</tr>\n")
+    };
+    let body: String = cells(curves).iter().map(|line| row("td", line)).collect();
+    format!("<table id=\"settings\">{}{body}</table>\n", row("th", &COLUMNS.map(String::from)))
 }
 
 fn line(c: &Curve) -> Line {

@@ -22,9 +22,13 @@ pub struct Row {
     pub seconds: f64,
     /// Seconds of the pre-passes.
     pub setup: f64,
+    /// Processor seconds of the whole program since the run began; `None` where the system does not tell.
+    pub cpu: Option<f64>,
     /// The square of the error of [`Metrics::error`](super::metric::Metrics::error), the reference's own taken off; for
     /// small ones, chance may make it negative.
     pub square: f64,
+    /// Mean of LDR-FLIP against the reference, 0..=1: what a person would see of the error.
+    pub flip: f64,
     /// Pixels brighter than ten times what they and their tile should be.
     pub fireflies: u64,
     /// Seconds of each of [`STAGES`].
@@ -40,7 +44,7 @@ pub struct Results {
     pub rows: Vec<Row>,
 }
 
-const HEADER: &str = "setting,biased,run,iterations,seconds,setup_seconds,square_error,fireflies,light_trace_s,vertex_bvh_s,eye_trace_s,roulette_s,visibility_s";
+const HEADER: &str = "setting,biased,run,iterations,seconds,setup_seconds,cpu_seconds,square_error,flip,fireflies,light_trace_s,vertex_bvh_s,eye_trace_s,roulette_s,visibility_s";
 
 impl Results {
     /// As text: `# name: value` lines, a header, a line for each row. Numbers come back to the last bit.
@@ -54,14 +58,16 @@ impl Results {
             let stages = r.stages.map(|s| s.to_string()).join(",");
             let _ = writeln!(
                 text,
-                "{},{},{},{},{},{},{},{},{stages}",
+                "{},{},{},{},{},{},{},{},{},{},{stages}",
                 r.setting,
                 u8::from(r.biased),
                 r.run,
                 r.iterations,
                 r.seconds,
                 r.setup,
+                r.cpu.map_or(String::new(), |s| s.to_string()),
                 r.square,
+                r.flip,
                 r.fireflies
             );
         }
@@ -113,15 +119,17 @@ fn row(line: &str) -> Option<Row> {
     let number = |i: usize| words.get(i)?.parse::<f64>().ok().filter(|x| x.is_finite());
     let count = |i: usize| words.get(i)?.parse::<u64>().ok();
     Some(Row {
-        setting: (words.len() == 13).then(|| words[0].to_owned())?,
+        setting: (words.len() == 15).then(|| words[0].to_owned())?,
         biased: count(1)? != 0,
         run: count(2)? as usize,
         iterations: count(3)?,
         seconds: number(4)?,
         setup: number(5)?,
-        square: number(6)?,
-        fireflies: count(7)?,
-        stages: [number(8)?, number(9)?, number(10)?, number(11)?, number(12)?],
+        cpu: if words.get(6)?.is_empty() { None } else { Some(number(6)?) },
+        square: number(7)?,
+        flip: number(8)?,
+        fireflies: count(9)?,
+        stages: [number(10)?, number(11)?, number(12)?, number(13)?, number(14)?],
     })
 }
 
@@ -138,11 +146,16 @@ mod tests {
             iterations: 8,
             seconds: 0.1 + 0.2,
             setup: 1e-9,
+            cpu: Some(0.7),
             square: -1.5e-7,
+            flip: 0.125,
             fireflies: 2,
             stages: [0.1, 0.0, 3.25, 1e9, 0.3],
         };
-        let results = Results { about: vec![("scene".into(), "a: b, c".into())], rows: vec![row] };
+        let results = Results {
+            about: vec![("scene".into(), "a: b, c".into())],
+            rows: vec![row.clone(), Row { cpu: None, ..row }],
+        };
         let directory = tempfile::tempdir().unwrap();
         let path = directory.path().join("results.csv");
         std::fs::write(&path, results.to_csv()).unwrap();

@@ -1,7 +1,7 @@
 //! A study: several settings of one scene, each run many times for a power-of-two ladder of iterations, in turn.
 
-use super::metric;
 use super::results::Row;
+use super::{flip, metric};
 use crate::error::{Error, Result};
 use crate::film::Film;
 use crate::image::Image;
@@ -14,6 +14,7 @@ use crate::scene::Scene;
 use crate::settings::Settings;
 use crate::subpath::World;
 use glam::Vec3;
+use rayon::prelude::*;
 use std::time::Instant;
 
 /// Most bytes of images that a study may keep.
@@ -61,11 +62,32 @@ pub struct Study {
 /// One run's images on the ladder, and what they cost.
 struct Ladder {
     images: Vec<Image>,
-    costs: Vec<(u64, f64, f64, [f64; 5])>,
+    costs: Vec<Cost>,
+}
+
+/// What a run had cost at a rung.
+#[derive(Debug, Clone, Copy)]
+struct Cost {
+    iterations: u64,
+    seconds: f64,
+    setup: f64,
+    cpu: Option<f64>,
+    stages: [f64; 5],
+}
+
+/// Processor seconds of the program so far, over all threads.
+fn cpu_seconds() -> Option<f64> {
+    #[cfg(unix)]
+    {
+        let now = rustix::time::clock_gettime(rustix::time::ClockId::ProcessCPUTime);
+        Some(now.tv_sec as f64 + now.tv_nsec as f64 * 1e-9)
+    }
+    #[cfg(not(unix))]
+    None
 }
 
 /// Runs it. Each run of each setting gets an equal share of `seconds`; the first runs show how many iterations that is.
-/// `runs` is at least 2. `tell` is told the finished share; false from it ends the study with an error.
+/// `runs` is at least 2. `exposure`: stops by which images are brighter when FLIP judges them. `tell` is told the finished share; false from it ends the study with an error.
 ///
 /// # Errors
 /// What rendering reports; [`Error::Memory`] when the images would not fit.
@@ -75,6 +97,7 @@ pub fn run(
     runs: usize,
     seconds: f64,
     given: Option<Reference>,
+    exposure: f32,
     tell: &dyn Fn(f64) -> bool,
 ) -> Result<Study> {
     let share = seconds / (runs.max(2) * contenders.len().max(1)) as f64;
@@ -90,11 +113,12 @@ pub fn run(
                 return Err(Error::Input("stopped: nothing was written".into()));
             }
             let settings = Settings {
-                seed: combine(contender.settings.seed, run as u64) >> 1,
+                // Numbers of its own: a reference made of another's runs shall not share their noise.
+                seed: combine(combine(contender.settings.seed, run as u64), i as u64) >> 1,
                 ..contender.settings.clone()
             };
             let ladder = climb(&worlds[i], scene, &settings, share, longest[i])?;
-            longest[i] = ladder.costs.last().map(|c| c.0);
+            longest[i] = ladder.costs.last().map(|c| c.iterations);
             ladders[i].push(ladder);
         }
         let kept: usize =
@@ -105,7 +129,7 @@ pub fn run(
             ));
         }
     }
-    Ok(measure(contenders, &ladders, given))
+    Ok(measure(contenders, &ladders, given, exposure))
 }
 
 /// Runs one ladder: up to `longest` iterations, or until the time is up.
@@ -116,7 +140,7 @@ fn climb(
     seconds: f64,
     longest: Option<u64>,
 ) -> Result<Ladder> {
-    let start = Instant::now();
+    let (start, cpu_before) = (Instant::now(), cpu_seconds());
     let mut machine = integrator::new(world, settings)?;
     let setup = start.elapsed().as_secs_f64();
     let mut film = Film::new(&scene.film);
@@ -138,7 +162,8 @@ fn climb(
         let done = iteration + 1;
         if done.is_power_of_two() {
             ladder.images.push(film.image());
-            ladder.costs.push((done, elapsed, setup, stages));
+            let cpu = cpu_seconds().zip(cpu_before).map(|(now, before)| now - before);
+            ladder.costs.push(Cost { iterations: done, seconds: elapsed, setup, cpu, stages });
             // The next rung takes as long as all so far.
             let up = match longest {
                 Some(longest) => done >= longest,
@@ -152,7 +177,12 @@ fn climb(
     Ok(ladder)
 }
 
-fn measure(contenders: &[Contender], ladders: &[Vec<Ladder>], given: Option<Reference>) -> Study {
+fn measure(
+    contenders: &[Contender],
+    ladders: &[Vec<Ladder>],
+    given: Option<Reference>,
+    exposure: f32,
+) -> Study {
     let tops: Vec<Vec<&Image>> =
         ladders.iter().map(|runs| runs.iter().filter_map(|l| l.images.last()).collect()).collect();
     let means: Vec<Reference> = tops.iter().map(|images| mean_and_variance(images)).collect();
@@ -167,12 +197,19 @@ fn measure(contenders: &[Contender], ladders: &[Vec<Ladder>], given: Option<Refe
     let reference = given.unwrap_or_else(|| means[owner.unwrap_or(0)].clone());
     let yardstick = Yardstick::new(&reference);
     let own_noise = yardstick.noise();
+    let seen = reference.mean.exposed(exposure);
+    let flip = |image: &Image| {
+        let map = flip::map(&image.exposed(exposure), &seen, flip::PIXELS_PER_DEGREE);
+        map.iter().sum::<f64>() / map.len() as f64
+    };
     let mut rows = Vec::new();
     for (i, (contender, runs)) in contenders.iter().zip(ladders).enumerate() {
         for (run, ladder) in runs.iter().enumerate() {
-            for (image, &(iterations, seconds, setup, stages)) in ladder.images.iter().zip(&ladder.costs) {
+            let flips: Vec<f64> = ladder.images.par_iter().map(&flip).collect();
+            for ((image, cost), flip) in ladder.images.iter().zip(&ladder.costs).zip(flips) {
+                let Cost { iterations, seconds, setup, cpu, stages } = *cost;
                 let measured = yardstick.square(image);
-                let longest = ladder.costs.last().map_or(1, |c| c.0);
+                let longest = ladder.costs.last().map_or(1, |c| c.iterations);
                 let square = if owner == Some(i) {
                     measured / (1.0 - iterations as f64 / (longest * runs.len() as u64) as f64)
                 } else {
@@ -187,7 +224,9 @@ fn measure(contenders: &[Contender], ladders: &[Vec<Ladder>], given: Option<Refe
                     iterations,
                     seconds,
                     setup,
+                    cpu,
                     square,
+                    flip,
                     fireflies,
                     stages,
                 });
@@ -198,7 +237,7 @@ fn measure(contenders: &[Contender], ladders: &[Vec<Ladder>], given: Option<Refe
         rows,
         owner,
         images: tops.iter().map(|images| images[0].clone()).collect(),
-        longest: ladders.iter().map(|runs| runs[0].costs.last().map_or(0, |c| c.0)).collect(),
+        longest: ladders.iter().map(|runs| runs[0].costs.last().map_or(0, |c| c.iterations)).collect(),
         reference,
     }
 }
@@ -276,7 +315,7 @@ fn mean_and_variance(images: &[&Image]) -> Reference {
 pub fn deviation_map(image: &Image, reference: &Image, exposure: f32) -> Result<Image> {
     metric::compare(image, reference, None, exposure)?;
     let [a, b] = [image, reference].map(|i| i.exposed(exposure));
-    let map = super::flip::map(&a, &b, super::flip::PIXELS_PER_DEGREE);
+    let map = flip::map(&a, &b, flip::PIXELS_PER_DEGREE);
     // Black, violet, orange, white.
     let ramp =
         [Vec3::ZERO, Vec3::new(0.25, 0.02, 0.35), Vec3::new(0.95, 0.25, 0.08), Vec3::new(1.0, 0.95, 0.8)];

@@ -33,11 +33,23 @@ impl Lobe {
         alpha_y: f64,
         reflectance: f64,
     ) -> Self {
+        Self::from_ggx_reflection_widened(frame, wo, (alpha_x, alpha_y), reflectance, 1.0)
+    }
+
+    /// [`Lobe::from_ggx_reflection`] with another measure of widening: a factor on [`GRAZING_WIDENING`], at least 0.
+    /// `alpha`: along `frame.x` and `frame.y`.
+    pub fn from_ggx_reflection_widened(
+        frame: &Frame,
+        wo: DVec3,
+        (alpha_x, alpha_y): (f64, f64),
+        reflectance: f64,
+        widening: f64,
+    ) -> Self {
         let v = Vertex::new(frame, wo, alpha_x, alpha_y);
         let o = v.wo;
         let in_plane = DVec3::new(v.px * o.z, v.py * o.z, v.sin);
         let axis = DVec3::new(-o.x, -o.y, o.z);
-        let widened = v.cos + GRAZING_WIDENING * v.alpha_in * v.sin;
+        let widened = v.cos + widening * GRAZING_WIDENING * v.alpha_in * v.sin;
         let weight = reflectance * v.normals() * v.masking(v.cos, v.sin) / (4.0 * v.cos);
         v.lobe(frame, in_plane, axis, (0.5, 0.5 / widened), weight)
     }
@@ -56,6 +68,19 @@ impl Lobe {
         eta: f64,
         transmittance: f64,
     ) -> Self {
+        Self::from_ggx_transmission_widened(frame, wo, (alpha_x, alpha_y), eta, transmittance, 1.0)
+    }
+
+    /// [`Lobe::from_ggx_transmission`] with another measure of widening: a factor on [`CRITICAL_WIDENING`], at least 0.
+    /// `alpha`: along `frame.x` and `frame.y`.
+    pub fn from_ggx_transmission_widened(
+        frame: &Frame,
+        wo: DVec3,
+        (alpha_x, alpha_y): (f64, f64),
+        eta: f64,
+        transmittance: f64,
+        widening: f64,
+    ) -> Self {
         let v = Vertex::new(frame, wo, alpha_x, alpha_y);
         let sin_t = (v.sin / eta).min(1.0);
         let cos_t = (1.0 - sin_t * sin_t).max(0.0).sqrt();
@@ -64,7 +89,7 @@ impl Lobe {
         let axis = DVec3::new(-v.px * sin_t, -v.py * sin_t, -cos_t);
         let in_plane = DVec3::new(-v.px * cos_t, -v.py * cos_t, sin_t);
         // Near the critical angle cos_t spreads over its own square root: what the normals' spread leaves of it.
-        let cos_t = (cos_t * cos_t + CRITICAL_WIDENING * k * v.alpha_in / eta).sqrt().min(1.0);
+        let cos_t = (cos_t * cos_t + widening * CRITICAL_WIDENING * k * v.alpha_in / eta).sqrt().min(1.0);
         let weight = transmittance * v.normals() * v.masking(cos_t, sin_t) * eta * eta * cos_t / (k * k);
         v.lobe(frame, in_plane, axis, (eta * cos_t / k, -eta / k), weight)
     }

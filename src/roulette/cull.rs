@@ -1,8 +1,9 @@
 //! The walk down the tree: numbers, boxes, vertices.
 
 use super::min_random::{Deal, Exact, Minimum, Nested, SemiStratified};
-use super::plane::{Box8, FlatLobe, Vec8};
-use super::{MinimumRandom, Query, QueryCounters, probability};
+use super::plane::{Box8, FlatLobe, PAD, Vec8};
+use super::precision::{NarrowLobe, narrow};
+use super::{LobePrecision, MinimumRandom, Query, QueryCounters, probability};
 use crate::vertex_bvh::{MAX_LEVELS, NodeId, VertexBvh, WIDTH};
 use fearless_simd::{Level, Simd, dispatch, f32x8, prelude::*};
 use smallvec::SmallVec;
@@ -65,7 +66,12 @@ fn start(
     }
     // Another tree's minima bound nothing here.
     cull &= query.pregenerated.is_none_or(|numbers| numbers.len() == bvh.len());
-    let mut walk = Walk { bvh, query, high: high.to_array(), low, lobes: &lobes, cull, stats, visit };
+    let mut narrow = SmallVec::<[NarrowLobe; MAX_LOBES]>::new();
+    if query.precision != LobePrecision::F64 {
+        narrow.extend(query.lobes.iter().map(|lobe| NarrowLobe::new(lobe, query.constant)));
+    }
+    let (high, pad) = (high.to_array(), PAD * query.padding);
+    let mut walk = Walk { bvh, query, high, low, lobes: &lobes, narrow: &narrow, pad, cull, stats, visit };
     if let Some(numbers) = query.pregenerated {
         return dispatch!(Level::new(), simd => walk.run(simd, root, numbers, &mut Waiting::new(())));
     }
@@ -117,6 +123,9 @@ struct Walk<'a> {
     high: [f32; 3],
     low: [f32; 3],
     lobes: &'a [FlatLobe],
+    /// For decisions in single precision.
+    narrow: &'a [NarrowLobe],
+    pad: f32,
     cull: bool,
     stats: &'a mut QueryCounters,
     visit: &'a mut dyn FnMut(u32, f64),
@@ -177,7 +186,7 @@ impl Walk<'_> {
         }
         let boxes = self.bvh.boxes(node);
         let center = Vec8::relative(simd, &boxes.center, self.high, self.low);
-        live & self.touched::<S, false>(numbers, Box8::new(simd, center, &boxes.half))
+        live & self.touched::<S, false>(numbers, Box8::new(simd, center, &boxes.half, self.pad))
     }
 
     /// The vertices of a block that the range may touch.
@@ -189,7 +198,7 @@ impl Walk<'_> {
         }
         let block = &self.bvh.blocks()[node.index as usize];
         let points = Vec8::relative(simd, &block.position, self.high, self.low);
-        live & self.touched::<S, true>(numbers, Box8::around_points(points))
+        live & self.touched::<S, true>(numbers, Box8::around_points(points, self.pad))
     }
 
     /// The children of a node that exist and that the query's mask lets through.
@@ -220,15 +229,43 @@ impl Walk<'_> {
         numbers.simd_gt(sum).to_bitmask() as u32 ^ 0xff
     }
 
-    /// The decision proper, in f64, for the vertices of a block that may be near enough.
+    /// The decision proper for the vertices of a block that may be near enough.
     #[inline(always)]
-    fn decide<S: Simd, D: Deal>(&mut self, node: NodeId, mut live: u32, deal: D, dealt: &D::Eight<S>) {
+    fn decide<S: Simd, D: Deal>(&mut self, node: NodeId, live: u32, deal: D, dealt: &D::Eight<S>) {
+        const F64: u8 = LobePrecision::F64 as u8;
+        const REBASED: u8 = LobePrecision::Rebased as u8;
+        const F32: u8 = LobePrecision::F32 as u8;
+        match self.query.precision {
+            LobePrecision::F64 => self.decide_in::<S, D, F64>(node, live, deal, dealt),
+            LobePrecision::Rebased => self.decide_in::<S, D, REBASED>(node, live, deal, dealt),
+            LobePrecision::F32 => self.decide_in::<S, D, F32>(node, live, deal, dealt),
+        }
+    }
+
+    /// [`Walk::decide`] in one [`LobePrecision`].
+    #[inline(always)]
+    fn decide_in<S: Simd, D: Deal, const PRECISION: u8>(
+        &mut self,
+        node: NodeId,
+        mut live: u32,
+        deal: D,
+        dealt: &D::Eight<S>,
+    ) {
         let block = &self.bvh.blocks()[node.index as usize];
         while live != 0 {
             let lane = live.trailing_zeros() as usize;
             live &= live - 1;
-            let offset = block.point(lane).as_dvec3() - self.query.position;
-            let p = probability(self.query.lobes, self.query.constant, offset);
+            let point = block.point(lane);
+            let p = if PRECISION == LobePrecision::F32 as u8 {
+                narrow(self.narrow.iter().copied(), point - self.query.position.as_vec3())
+            } else {
+                let offset = point.as_dvec3() - self.query.position;
+                if PRECISION == LobePrecision::Rebased as u8 {
+                    narrow(self.narrow.iter().copied(), offset.as_vec3())
+                } else {
+                    probability(self.query.lobes, self.query.constant, offset)
+                }
+            };
             self.stats.leaves += 1;
             self.stats.expected += p;
             // A number rounded up to 1 must not refuse what is certain.

@@ -1,6 +1,7 @@
 //! The squared ellipsoidal lobe \[HRR19\], in a form that stays accurate at every roughness (docs/theory.md section 3).
 
 use crate::math::Frame;
+pub use crate::settings::Range;
 use glam::DVec3;
 
 /// A weighted squared ellipsoidal lobe `c K(w)`, by which the roulette judges directions.
@@ -17,18 +18,6 @@ pub struct Lobe {
     inv_x: f64,
     inv_y: f64,
     weight: f64,
-}
-
-/// The shape of the range in which a lobe accepts light vertices.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum Range {
-    /// As the lobe is.
-    #[default]
-    Ellipsoid,
-    /// Round about the axis, as wide as the lobe's wider side [Tokuyoshi & Harada 2017].
-    Spheroid,
-    /// The same in all directions: knows nothing of the lobe but its size [Tokuyoshi & Harada 2016].
-    Sphere,
 }
 
 /// Smallest roughness of a lobe; a GGX roughness of 1e-7 seen at a cosine of 1e-6 needs less than 1e-13.
@@ -91,6 +80,17 @@ impl Lobe {
             Range::Spheroid => Self::new(self.frame, widest, widest, self.weight),
             Range::Sphere => Self::new(self.frame, 1.0, 1.0, self.weight),
         }
+    }
+
+    /// As [`Lobe::with_range`], with the weight lowered as the range is widened: about as many vertices are accepted as
+    /// by the ellipsoid, since `alpha_x alpha_y` times the weight, to which the integral of the lobe over directions is
+    /// proportional, stays the same.
+    pub fn with_equal_range(self, range: Range) -> Self {
+        if range == Range::Ellipsoid {
+            return self;
+        }
+        let wider = self.with_range(range);
+        wider.with_weight(self.weight * (self.alpha_x / wider.alpha_x) * (self.alpha_y / wider.alpha_y))
     }
 
     /// K in a direction (unit or not), in (0,1]; 1 on the axis. Without the weight.
@@ -261,6 +261,40 @@ mod tests {
             let expected = 4.0 * std::f64::consts::PI * a * a;
             assert!((sum / expected - 1.0).abs() < 1e-5, "{a}: {sum}");
         }
+    }
+
+    #[test]
+    fn equal_ranges_have_equal_integrals() {
+        // Of the lobe's value over all directions, with offsets of length 1: what is accepted of vertices all around.
+        let integral = |lobe: &Lobe| {
+            let (rings, sectors) = (2000, 720);
+            let lo = 1e-6f64.ln();
+            let width = (std::f64::consts::PI.ln() - lo) / f64::from(rings);
+            let mut sum = 0.0;
+            for i in 0..rings {
+                let theta = (lo + (f64::from(i) + 0.5) * width).exp();
+                let ring = (0..sectors).map(|j| {
+                    let phi = (f64::from(j) + 0.5) / f64::from(sectors) * std::f64::consts::TAU;
+                    let local = DVec3::new(theta.sin() * phi.cos(), theta.sin() * phi.sin(), theta.cos());
+                    lobe.weight() / lobe.h2(lobe.frame().to_world(local))
+                });
+                let mean = ring.sum::<f64>() / f64::from(sectors);
+                sum += mean * theta.sin() * theta * width * std::f64::consts::TAU;
+            }
+            sum
+        };
+        for (ax, ay, within) in
+            [(1e-3, 1e-3, 1e-4), (1e-3, 1e-2, 0.01), (0.02, 0.002, 0.01), (0.1, 0.1, 1e-4), (0.3, 0.1, 0.2)]
+        {
+            let lobe = Lobe::new(frame(5), ax, ay, 3.0);
+            let truth = integral(&lobe);
+            for range in Range::ALL {
+                let ratio = integral(&lobe.with_equal_range(range)) / truth;
+                assert!((ratio - 1.0).abs() < within, "{range} {ax} {ay}: {ratio}");
+            }
+        }
+        let lobe = Lobe::new(frame(5), 0.1, 0.01, 3.0);
+        assert_eq!(lobe.with_equal_range(Range::Ellipsoid), lobe);
     }
 
     #[test]

@@ -16,10 +16,12 @@ mod cull;
 pub mod lobe;
 pub mod min_random;
 mod plane;
+mod precision;
 
 pub use cull::{MAX_LOBES, query, query_brute_force};
 pub use lobe::{Lobe, Range};
 pub use min_random::{MinimumRandom, Pregenerated};
+pub use precision::{LobePrecision, probability_in};
 
 use glam::DVec3;
 
@@ -41,13 +43,28 @@ pub struct Query<'a> {
     /// Numbers shared with other queries, in place of those that `key` and `rule` would deal: for comparison. Without
     /// use for culling, but still unbiased, when made for a tree of another size.
     pub pregenerated: Option<&'a Pregenerated>,
+    /// Arithmetic of the probabilities. With any but [`LobePrecision::F64`], [`query()`] and [`query_brute_force`] may
+    /// differ by what rounding does to these.
+    pub precision: LobePrecision,
+    /// How far boxes are grown, over what covers the roundings of their tests; at least 0. Below 1, vertices may be
+    /// missed.
+    pub padding: f32,
 }
 
 impl<'a> Query<'a> {
     /// A query over all vertices with the default rule.
     pub fn new(position: DVec3, lobes: &'a [Lobe], constant: f64, key: u64) -> Self {
-        let (mask, rule, pregenerated) = (u32::MAX, MinimumRandom::default(), None);
-        Self { position, lobes, constant, key, mask, rule, pregenerated }
+        Self {
+            position,
+            lobes,
+            constant,
+            key,
+            mask: u32::MAX,
+            rule: MinimumRandom::default(),
+            pregenerated: None,
+            precision: LobePrecision::default(),
+            padding: 1.0,
+        }
     }
 }
 

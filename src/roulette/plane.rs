@@ -22,7 +22,7 @@ pub(super) struct FlatLobe {
 }
 
 /// Roundings as a fraction of a box's reach (L1 norms of centre and half extents): of the offset, the rows, the plane.
-const PAD: f32 = 6e-7;
+pub(super) const PAD: f32 = 6e-7;
 
 /// The same as a length: what is lost where f32 ends, with denormals flushed to zero.
 const TINY: f32 = 1e-37;
@@ -134,7 +134,7 @@ impl<S: Simd> Vec8<S> {
     }
 }
 
-/// Eight boxes relative to the eye vertex, grown by what roundings may move.
+/// Eight boxes relative to the eye vertex, grown by what roundings may move: their reach times a pad, by default [`PAD`].
 #[derive(Clone, Copy)]
 pub(super) struct Box8<S: Simd> {
     center: Vec8<S>,
@@ -143,16 +143,16 @@ pub(super) struct Box8<S: Simd> {
 
 impl<S: Simd> Box8<S> {
     #[inline(always)]
-    pub fn new(simd: S, center: Vec8<S>, half: &[[f32; 8]; 3]) -> Self {
+    pub fn new(simd: S, center: Vec8<S>, half: &[[f32; 8]; 3], pad: f32) -> Self {
         let half = Vec8::load(simd, half);
-        let pad = (center.abs().sum() + half.sum()).mul_add(PAD, TINY);
+        let pad = (center.abs().sum() + half.sum()).mul_add(pad, TINY);
         Self { center, half: half.add_to_each(pad) }
     }
 
     /// Boxes around points: nothing but the pad.
     #[inline(always)]
-    pub fn around_points(points: Vec8<S>) -> Self {
-        let pad = points.abs().sum().mul_add(PAD, TINY);
+    pub fn around_points(points: Vec8<S>, pad: f32) -> Self {
+        let pad = points.abs().sum().mul_add(pad, TINY);
         Self { center: points, half: Vec8 { x: pad, y: pad, z: pad } }
     }
 
@@ -253,9 +253,9 @@ mod tests {
         dispatch!(Level::new(), simd => {
             let center = Vec8::relative(simd, &boxes[0], high.to_array(), low);
             let b = if points {
-                Box8::around_points(center).bound::<true>(&flat)
+                Box8::around_points(center, PAD).bound::<true>(&flat)
             } else {
-                Box8::new(simd, center, &boxes[1]).bound::<false>(&flat)
+                Box8::new(simd, center, &boxes[1], PAD).bound::<false>(&flat)
             };
             b.store_slice(&mut out);
         });

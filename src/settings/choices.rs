@@ -110,6 +110,60 @@ choice! {
 }
 
 choice! {
+    /// The shape of the range in which a lobe of the roulette accepts light vertices.
+    #[derive(Default)]
+    Range, "range", range {
+        /// As the lobe is.
+        #[default]
+        Ellipsoid = "ellipsoid",
+        /// Round about the axis, as wide as the lobe's wider side [Tokuyoshi & Harada 2017].
+        Spheroid = "spheroid",
+        /// The same in all directions: knows nothing of the lobe but its size [Tokuyoshi & Harada 2016].
+        Sphere = "sphere",
+    }
+}
+
+choice! {
+    /// Where the roulette's random numbers come from, of which it knows the minimum below every node.
+    MinimumRule, "minimum", minimum {
+        /// Dealt on the way down; children of equal size get one stratum each.
+        Nested = "nested",
+        /// Dealt on the way down; siblings share out the range above the parent's stratum \[HRR19\].
+        SemiStratified = "semi-stratified",
+        /// Dealt on the way down: the true minimum of independent uniforms.
+        Exact = "exact",
+        /// One for each light vertex, shared by all queries of an iteration [Tokuyoshi & Harada 2016].
+        Pregenerated = "pregenerated",
+    }
+}
+
+choice! {
+    /// The arithmetic in which the roulette computes the probability of a light vertex.
+    #[derive(Default)]
+    LobePrecision, "lobe_precision", lobe_precision {
+        /// Double precision throughout.
+        #[default]
+        F64 = "f64",
+        /// The offset from eye to light vertex in double precision, all after that in single.
+        Rebased = "rebased",
+        /// Single precision throughout, the eye vertex's position included.
+        F32 = "f32",
+    }
+}
+
+choice! {
+    /// How much time Embree takes to build its tree.
+    EmbreeBuild, "embree_build", embree_build {
+        /// With the surface area heuristic, and triangles that are cut where that helps.
+        High = "high",
+        /// With the surface area heuristic.
+        Medium = "medium",
+        /// By the order of a space-filling curve.
+        Low = "low",
+    }
+}
+
+choice! {
     /// Whether something is done.
     Switch, "guiding", guiding {
         /// It is not.
@@ -142,6 +196,10 @@ mod tests {
         assert!(Switch::ALL.iter().all(|v| v.to_string().parse() == Ok(*v)));
         assert!(EmitterVertices::ALL.iter().all(|v| v.to_string().parse() == Ok(*v)));
         assert!(Heuristic::ALL.iter().all(|v| v.to_string().parse() == Ok(*v)));
+        assert!(Range::ALL.iter().all(|v| v.to_string().parse() == Ok(*v)));
+        assert!(LobePrecision::ALL.iter().all(|v| v.to_string().parse() == Ok(*v)));
+        assert!(EmbreeBuild::ALL.iter().all(|v| v.to_string().parse() == Ok(*v)));
+        assert!(MinimumRule::ALL.iter().all(|v| v.to_string().parse() == Ok(*v)));
         assert_eq!("lvc+hrr".parse(), Ok(Integrator::LvcHrr));
         assert_eq!("brute".parse(), Ok(Backend::Brute));
     }

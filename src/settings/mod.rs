@@ -5,7 +5,9 @@ mod choices;
 mod effects;
 mod table;
 
-pub use choices::{Backend, EmitterVertices, Heuristic, Integrator, Switch};
+pub use choices::{
+    Backend, EmbreeBuild, EmitterVertices, Heuristic, Integrator, LobePrecision, MinimumRule, Range, Switch,
+};
 pub use effects::{Effect, EffectSet};
 pub use table::TABLE;
 
@@ -24,6 +26,10 @@ pub struct Settings {
     pub max_depth: u32,
     /// Ray query backend.
     pub visibility: Backend,
+    /// Whether no ray slips between two triangles that share an edge (Embree).
+    pub embree_robust: Switch,
+    /// How much time Embree takes to build its tree.
+    pub embree_build: EmbreeBuild,
     /// Iterations to run (each `samples` eye samples per pixel).
     pub iterations: u64,
     /// Most memory for light vertices where they are not set, 1e9 bytes; 0 = half of the machine's.
@@ -52,6 +58,18 @@ pub struct Settings {
     pub axis_probability: Option<f64>,
     /// Largest GGX roughness at which the roulette is used.
     pub hrr_alpha: f64,
+    /// Shape of the roulette's ranges.
+    pub range: Range,
+    /// Where the roulette's random numbers come from.
+    pub minimum: MinimumRule,
+    /// Arithmetic of the roulette's probabilities.
+    pub lobe_precision: LobePrecision,
+    /// How much the roulette's lobes are widened where the mirrored lobe is not that of one normal; 1: as suits.
+    pub lobe_widening: f64,
+    /// Weight of an even lobe under the roulette's lobe of reflection, as a share of it.
+    pub lobe_floor: f64,
+    /// How far the roulette's boxes are grown, over what covers the roundings of their tests.
+    pub node_padding: f64,
     /// Probability of storing a light vertex whose predecessor does not scatter narrowly, where the roulette plays.
     pub storing: f64,
     /// Whether the roulette judges points of lights as well.
@@ -82,6 +100,8 @@ impl Default for Settings {
             without: EffectSet::default(),
             max_depth: 24,
             visibility: Backend::BEST,
+            embree_robust: Switch::On,
+            embree_build: EmbreeBuild::High,
             iterations: 64,
             memory: 0.0,
             first_iteration: 0,
@@ -95,6 +115,12 @@ impl Default for Settings {
             expected: 1.0,
             axis_probability: None,
             hrr_alpha: 0.3,
+            range: Range::Ellipsoid,
+            minimum: MinimumRule::Nested,
+            lobe_precision: LobePrecision::F64,
+            lobe_widening: 1.0,
+            lobe_floor: 0.0,
+            node_padding: 1.0,
             storing: 0.05,
             emitters: EmitterVertices::Auto,
             guiding: Switch::On,

@@ -1,6 +1,9 @@
 //! One row for every setting.
 
-use super::{Backend, EmitterVertices, Heuristic, Integrator, Kind, Setting, Switch};
+use super::{
+    Backend, EmbreeBuild, EmitterVertices, Heuristic, Integrator, Kind, LobePrecision, MinimumRule, Range,
+    Setting, Switch,
+};
 
 const TRANSPORT: &str = "Light transport";
 const BUDGET: &str = "Budget and randomness";
@@ -133,6 +136,91 @@ pub const TABLE: &[Setting] = &[
         heading: TRANSPORT,
         help: "Largest GGX roughness at which the roulette is used",
         doc: "",
+    },
+    Setting {
+        name: "range",
+        kind: Kind::Choice {
+            names: &Range::NAMES,
+            planned: &[],
+            get: |s| s.range as usize,
+            set: |s, i| s.range = Range::ALL[i],
+        },
+        default: "ellipsoid",
+        value_name: "NAME",
+        heading: TRANSPORT,
+        help: "Shape of the range in which the roulette (+hrr) keeps light vertices",
+        doc: "ellipsoid: as the lobe of the surface is. spheroid: round about the axis, as wide as the lobe's wider side. \
+              sphere: the same in all directions. All keep about as many light vertices for a value of expected; the \
+              simpler ones, for comparison, keep the wrong ones more often.",
+    },
+    Setting {
+        name: "minimum",
+        kind: Kind::Choice {
+            names: &MinimumRule::NAMES,
+            planned: &[],
+            get: |s| s.minimum as usize,
+            set: |s, i| s.minimum = MinimumRule::ALL[i],
+        },
+        default: "nested",
+        value_name: "NAME",
+        heading: TRANSPORT,
+        help: "Where the roulette (+hrr) has its random numbers from, whose minimum below a node it must know",
+        doc: "nested: dealt on the way down, children of a node in a stratum each. semi-stratified: the paper's rule. \
+              exact: the true minimum of independent numbers. pregenerated: one number for each light vertex and \
+              iteration, shared by all queries, as in stochastic light culling. The last three are for comparison.",
+    },
+    Setting {
+        name: "lobe_precision",
+        kind: Kind::Choice {
+            names: &LobePrecision::NAMES,
+            planned: &[],
+            get: |s| s.lobe_precision as usize,
+            set: |s, i| s.lobe_precision = LobePrecision::ALL[i],
+        },
+        default: "f64",
+        value_name: "NAME",
+        heading: TRANSPORT,
+        help: "Arithmetic in which the roulette (+hrr) computes probabilities",
+        doc: "f64: double precision. rebased: the offset between the two vertices in double precision, the rest in single. f32: \
+              single precision throughout. The last two are for comparison: in narrow lobes they bias the image.",
+    },
+    Setting {
+        name: "lobe_widening",
+        kind: Kind::Real {
+            min: 0.0,
+            max: 1e3,
+            get: |s| Some(s.lobe_widening),
+            set: |s, v| s.lobe_widening = v,
+        },
+        default: "1.0",
+        value_name: "FACTOR",
+        heading: TRANSPORT,
+        help: "How much the roulette's (+hrr) lobes are widened at grazing angles; 1: as suits, 0: not at all",
+        doc: "Also for refraction near the critical angle. Costs or spares noise; never biases.",
+    },
+    Setting {
+        name: "lobe_floor",
+        kind: Kind::Real { min: 0.0, max: 1.0, get: |s| Some(s.lobe_floor), set: |s, v| s.lobe_floor = v },
+        default: "0.0",
+        value_name: "SHARE",
+        heading: TRANSPORT,
+        help: "Share of a lobe's light vertices that the roulette (+hrr) also keeps from all directions",
+        doc: "A floor under the lobe for what its model misses of the surface's tails: fewer bright spots, more vertices. Not \
+              at surfaces that transmit.",
+    },
+    Setting {
+        name: "node_padding",
+        kind: Kind::Real {
+            min: 0.0,
+            max: 1e6,
+            get: |s| Some(s.node_padding),
+            set: |s, v| s.node_padding = v,
+        },
+        default: "1.0",
+        value_name: "FACTOR",
+        heading: TRANSPORT,
+        help: "How far the roulette (+hrr) grows the boxes that it tests, over what their roundings need",
+        doc: "Below 1, light vertices may be missed, and the image biased; above, time is lost.",
     },
     Setting {
         name: "storing",
@@ -357,6 +445,34 @@ pub const TABLE: &[Setting] = &[
         heading: MACHINE,
         help: "What answers ray queries",
         doc: "embree: Intel Embree. obvhs: pure Rust. brute: every triangle, for tests.",
+    },
+    Setting {
+        name: "embree_robust",
+        kind: Kind::Choice {
+            names: &Switch::NAMES,
+            planned: &[],
+            get: |s| s.embree_robust as usize,
+            set: |s, i| s.embree_robust = Switch::ALL[i],
+        },
+        default: "on",
+        value_name: "NAME",
+        heading: MACHINE,
+        help: "Whether Embree lets no ray slip between two triangles that share an edge",
+        doc: "off: faster, and light leaks through edges now and then.",
+    },
+    Setting {
+        name: "embree_build",
+        kind: Kind::Choice {
+            names: &EmbreeBuild::NAMES,
+            planned: &[],
+            get: |s| s.embree_build as usize,
+            set: |s, i| s.embree_build = EmbreeBuild::ALL[i],
+        },
+        default: "high",
+        value_name: "NAME",
+        heading: MACHINE,
+        help: "How much time Embree takes to build its tree",
+        doc: "high: the fastest rays. medium: without cutting triangles. low: the fastest build.",
     },
     Setting {
         name: "threads",

@@ -33,11 +33,11 @@ impl<'a> World<'a> {
             scene,
             lights: Lights::new(&scene.mesh, &scene.materials, &scene.lights),
             camera: Camera::new(&scene.camera, (scene.film.width, scene.film.height), scene.mesh.origin)?,
-            visibility: visibility::build_with_cutouts(
+            visibility: visibility::build_with(
                 settings.visibility,
                 &scene.mesh,
                 Cutouts::new(&scene.mesh, &scene.materials),
-                settings.threads,
+                visibility::Options::of(settings),
             )?,
         })
     }

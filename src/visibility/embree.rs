@@ -10,9 +10,10 @@
 // One of the crate's two doors to C.
 #![allow(unsafe_code)]
 
-use super::{Cutouts, Hit, Ray, Visibility, cutouts};
+use super::{Cutouts, Hit, Options, Ray, Visibility, cutouts};
 use crate::error::{Error, Result};
 use crate::geometry::Mesh;
+use crate::settings::EmbreeBuild;
 use embree4_sys as sys;
 use glam::{Vec3, Vec4};
 use std::ffi::{CString, c_void};
@@ -63,8 +64,8 @@ impl Context {
 }
 
 impl Embree {
-    /// Builds the acceleration structure with up to `threads` threads (0: all). The mesh is copied.
-    pub fn new(mesh: &Mesh, cutouts: Option<Cutouts>, threads: usize) -> Result<Self> {
+    /// Builds the acceleration structure. The mesh is copied.
+    pub fn new(mesh: &Mesh, cutouts: Option<Cutouts>, options: Options) -> Result<Self> {
         mesh.validate()?;
         let scale =
             inverse_power(mesh.positions.iter().fold(0.0, |size: f32, p| size.max(p.abs().max_element())));
@@ -74,14 +75,14 @@ impl Embree {
         let triangles = Box::new(Triangles { positions, corners: mesh.triangles.clone(), cutouts });
         // Before the device, so that it outlives it on the way out of an error, too.
         let bytes = Box::new(AtomicI64::new(0));
-        let device = Device::new(threads)?;
+        let device = Device::new(options.threads)?;
         let counter: *const AtomicI64 = &*bytes;
         // SAFETY: the device is live; the counter outlives it, since `Embree` drops it after the scene, which holds the
         // last reference to the device.
         unsafe {
             sys::rtcSetDeviceMemoryMonitorFunction(device.0, Some(count_bytes), counter.cast_mut().cast());
         }
-        let scene = Scene::new(&device)?;
+        let scene = Scene::new(&device, options)?;
         if !triangles.corners.is_empty() {
             let geometry = Geometry::new(&device, &triangles)?;
             // SAFETY: geometry and scene are live and of the same device; the scene takes its own reference.
@@ -368,14 +369,20 @@ unsafe impl Send for Scene {}
 unsafe impl Sync for Scene {}
 
 impl Scene {
-    fn new(device: &Device) -> Result<Self> {
+    fn new(device: &Device, options: Options) -> Result<Self> {
         // SAFETY: the device is live.
         let scene = Self(unsafe { sys::rtcNewScene(device.0) });
         device.check("making a scene")?;
+        let flags = if options.embree_robust { sys::RTC_SCENE_FLAG_ROBUST } else { sys::RTC_SCENE_FLAG_NONE };
         // SAFETY: both are live. Robust: no ray slips between two triangles that share an edge.
-        unsafe { sys::rtcSetSceneFlags(scene.0, sys::RTC_SCENE_FLAG_ROBUST) };
+        unsafe { sys::rtcSetSceneFlags(scene.0, flags) };
+        let quality = match options.embree_build {
+            EmbreeBuild::High => sys::RTC_BUILD_QUALITY_HIGH,
+            EmbreeBuild::Medium => sys::RTC_BUILD_QUALITY_MEDIUM,
+            EmbreeBuild::Low => sys::RTC_BUILD_QUALITY_LOW,
+        };
         // SAFETY: as above.
-        unsafe { sys::rtcSetSceneBuildQuality(scene.0, sys::RTC_BUILD_QUALITY_HIGH) };
+        unsafe { sys::rtcSetSceneBuildQuality(scene.0, quality) };
         device.check("setting up the scene")?;
         Ok(scene)
     }
@@ -462,7 +469,7 @@ mod tests {
         for scale in [1e-30, 1e-12, 1e12, 1e30] {
             let positions = [Vec3::ZERO, Vec3::X, Vec3::Y].map(|p| p * scale).to_vec();
             let mesh = Mesh { positions, triangles: vec![[0, 1, 2]], materials: vec![0], ..Mesh::default() };
-            let embree = Embree::new(&mesh, None, 1).unwrap();
+            let embree = Embree::new(&mesh, None, Options::threads(1)).unwrap();
             for length in [scale, 1.0] {
                 let origin = Vec3::new(0.25, 0.5, 4.0) * scale;
                 let ray = Ray { origin, direction: -Vec3::Z * length, t_min: 0.0, t_max: f32::INFINITY };

@@ -2,7 +2,7 @@
 
 use crate::error::Result;
 use crate::geometry::Mesh;
-use crate::settings::Backend;
+use crate::settings::{Backend, EmbreeBuild, Settings, Switch};
 use glam::Vec3;
 
 pub mod brute;
@@ -55,13 +55,40 @@ pub trait Visibility: Send + Sync {
     }
 }
 
+/// How a structure is built.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Options {
+    /// Threads at most; 0: all.
+    pub threads: usize,
+    /// Whether no ray slips between two triangles that share an edge. Obvhs never lets any.
+    pub embree_robust: bool,
+    /// How much time Embree takes.
+    pub embree_build: EmbreeBuild,
+}
+
+impl Options {
+    /// The default with up to `threads` threads (0: all).
+    pub fn threads(threads: usize) -> Self {
+        Self { threads, ..Self::of(&Settings::default()) }
+    }
+
+    /// What settings say.
+    pub fn of(settings: &Settings) -> Self {
+        Self {
+            threads: settings.threads,
+            embree_robust: settings.embree_robust == Switch::On,
+            embree_build: settings.embree_build,
+        }
+    }
+}
+
 /// Builds a backend's structure over a mesh with up to `threads` threads (0: all). The mesh is copied.
 ///
 /// # Errors
 /// [`Error::Usage`](crate::Error::Usage) when the backend is not part of this build, [`Error::Input`](crate::Error::Input) for an invalid mesh, and what the
 /// library below reports.
 pub fn build(backend: Backend, mesh: &Mesh, threads: usize) -> Result<Box<dyn Visibility>> {
-    build_with_cutouts(backend, mesh, None, threads)
+    build_with(backend, mesh, None, Options::threads(threads))
 }
 
 /// As [`build`], over surfaces of which `cutouts` says where they stop rays.
@@ -74,14 +101,27 @@ pub fn build_with_cutouts(
     cutouts: Option<Cutouts>,
     threads: usize,
 ) -> Result<Box<dyn Visibility>> {
+    build_with(backend, mesh, cutouts, Options::threads(threads))
+}
+
+/// As [`build_with_cutouts`], with a say in how.
+///
+/// # Errors
+/// As [`build`].
+pub fn build_with(
+    backend: Backend,
+    mesh: &Mesh,
+    cutouts: Option<Cutouts>,
+    options: Options,
+) -> Result<Box<dyn Visibility>> {
     match backend {
         #[cfg(feature = "embree")]
-        Backend::Embree => Ok(Box::new(embree::Embree::new(mesh, cutouts, threads)?)),
+        Backend::Embree => Ok(Box::new(embree::Embree::new(mesh, cutouts, options)?)),
         #[cfg(not(feature = "embree"))]
         Backend::Embree => {
             Err(crate::Error::Usage("this hrr was built without Embree (cargo feature 'embree')".into()))
         }
-        Backend::Obvhs => Ok(Box::new(obvhs::Obvhs::new(mesh, cutouts, threads)?)),
+        Backend::Obvhs => Ok(Box::new(obvhs::Obvhs::new(mesh, cutouts, options.threads)?)),
         Backend::Brute => Ok(Box::new(brute::Brute::new(mesh, cutouts)?)),
     }
 }

@@ -2,7 +2,7 @@
 
 use hrr::material::{Material, Scattering};
 use hrr::scene::Scene;
-use hrr::settings::{Integrator, Settings};
+use hrr::settings::{Integrator, Range, Settings};
 use hrr::subpath::World;
 use std::path::Path;
 
@@ -27,6 +27,10 @@ pub struct Variant {
 const PCBPT: Recipe = Recipe { name: "pcbpt", set: |s| Settings { integrator: Integrator::Pcbpt, ..s } };
 const PCBPT_HRR: Recipe =
     Recipe { name: "pcbpt+hrr", set: |s| Settings { integrator: Integrator::PcbptHrr, ..s } };
+const PCBPT_SPHEROID: Recipe = Recipe {
+    name: "pcbpt+hrr spheroid",
+    set: |s| Settings { integrator: Integrator::PcbptHrr, range: Range::Spheroid, ..s },
+};
 const PT: Recipe = Recipe { name: "pt", set: |s| Settings { integrator: Integrator::Pt, ..s } };
 const LVC: Recipe = Recipe { name: "lvc", set: |s| Settings { integrator: Integrator::Lvc, ..s } };
 const LVC_HRR: Recipe = Recipe { name: "lvc+hrr", set: |s| Settings { integrator: Integrator::LvcHrr, ..s } };
@@ -41,7 +45,7 @@ pub fn of(study: &str, size: [u32; 2]) -> Option<(Vec<Variant>, Vec<Recipe>)> {
         // Caustics reflected in a mirror of roughness 1e-4.
         "mirror" => (vec![judged(load("caustic_mirror"), "mirror")], vec![PCBPT, PCBPT_HRR]),
         // Caustics reflected in brushed metal of roughness 1e-4 and 1e-2.
-        "brushed" => (vec![judged(load("brushed_funnel"), "steel")], vec![PCBPT, PCBPT_HRR]),
+        "brushed" => (vec![judged(load("brushed_funnel"), "steel")], vec![PCBPT, PCBPT_HRR, PCBPT_SPHEROID]),
         // What the roulette costs beside merging.
         "merging" => (vec![variant(load("mirror_room"), "mirror")], vec![PCVCM, PCVCM_HRR]),
         // Where the roulette has little to gain, or nothing.

@@ -6,17 +6,20 @@ use crate::progress::Reporter;
 use crate::reference::{directory, make};
 use crate::render::stop_on_interrupt;
 use crate::scene_args::{self, SceneArgs};
+use crate::sweep::{Sweep, contenders, sweep_arg};
 use clap::builder::ValueHint;
 use clap::{Arg, ArgAction, ArgMatches, value_parser};
 use hrr::image::{self, Attributes};
-use hrr::integrator::{Recipe, Size};
+use hrr::integrator::Size;
 use hrr::render::{Observer, Progress};
+use hrr::report::chart;
 use hrr::report::curve::curves;
-use hrr::report::page::{Pictures, page, sentences};
+use hrr::report::markdown::markdown;
+use hrr::report::page::{Pictures, figures, page, sentences};
 use hrr::report::results::Results;
 use hrr::report::study::{self, Contender, Reference, deviation_map};
 use hrr::scene::Scene;
-use hrr::settings::{Heuristic, Integrator, Settings, Switch};
+use hrr::settings::Settings;
 use hrr::{Error, Result, file};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -29,6 +32,7 @@ pub struct CostArgs {
     replot: Option<PathBuf>,
     reference: Option<PathBuf>,
     quick: bool,
+    sweeps: Vec<Sweep>,
     runs: usize,
     seconds: f64,
     exposure: f32,
@@ -47,10 +51,12 @@ Examples:
       the main integrators at a small size, in about two minutes
   hrr cost scene.toml -o study --seconds 3600 --reference reference
       integrators and knobs, measured against what 'hrr reference' made
+  hrr cost scene.toml -o study --sweep range=spheroid,sphere --sweep expected=0.1,10
+      integrators, and these values of two settings
   hrr cost --replot study/results.csv -o study
       draws the page again
 
-Writes report.html (self-contained), results.csv (every number) and the images. Each setting is run --runs times with
+Writes report.html (self-contained), report.md with its figures beside it, results.csv (every number) and the images. Each setting is run --runs times with
 different seeds, in turn with the others, and looked at after 1, 2, 4, ... iterations. Without --reference, errors are
 measured against the mean of all runs of the setting that knows most.";
 
@@ -65,6 +71,7 @@ impl CostArgs {
             replot: path("replot"),
             reference: path("reference"),
             quick,
+            sweeps: m.get_many::<Sweep>("sweep").into_iter().flatten().cloned().collect(),
             runs: m.get_one::<u32>("runs").copied().unwrap_or(16) as usize,
             seconds: m.get_one::<f64>("seconds").copied().unwrap_or(seconds),
             exposure: m.get_one::<f32>("exposure").copied().unwrap_or(0.0),
@@ -101,6 +108,7 @@ pub fn command() -> clap::Command {
                 .conflicts_with_all(["scene", "quick"]),
         )
         .arg(place("reference", "DIR", "Measure against mean.exr and variance.exr in it"))
+        .arg(sweep_arg())
         .arg(runs_arg())
         .arg(seconds_arg("Seconds for all runs [default: 900; 90 with --quick]"))
         .arg(exposure_arg("Output", "Stops by which the images are brighter"))
@@ -141,7 +149,7 @@ pub fn run(args: &CostArgs, log: &Log) -> Result<u8> {
     }
     let size = Size::of(&settings, &scene.film);
     (settings.samples, settings.light_subpaths) = (size.samples, size.light_subpaths);
-    let contenders = contenders(&scene, &settings, args.quick)?;
+    let contenders = contenders(&scene, &settings, args.quick, &args.sweeps)?;
     log.info(format_args!(
         "{}: {} settings, {} runs of each, {}x{} pixels, about {}",
         scene.path.display(),
@@ -167,7 +175,7 @@ pub fn run(args: &CostArgs, log: &Log) -> Result<u8> {
         )));
     }
     let study = observed(log, settings.threads, args.seconds, |tell| {
-        study::run(&scene, &contenders, args.runs, args.seconds, given, tell)
+        study::run(&scene, &contenders, args.runs, args.seconds, given, args.exposure, tell)
     })?;
     let results = Results { about: about(&scene, &settings, &contenders, study.owner), rows: study.rows };
     let put = |name: String, picture: &image::Image| {
@@ -235,51 +243,6 @@ fn shrink(scene: &mut Scene, settings: &mut Settings, args: &SceneArgs) {
     }
 }
 
-/// The scene's own integrator first, then others that find all of its light, then its knobs.
-fn contenders(scene: &Scene, settings: &Settings, quick: bool) -> Result<Vec<Contender>> {
-    let base = Settings { integrator: hrr::render::chosen(scene, settings)?, ..settings.clone() };
-    let biased = |s: &Settings| Recipe::of(s.integrator).is_some_and(|r| r.merging);
-    let mut list: Vec<Contender> = Vec::new();
-    let mut add = |name: String, settings: Settings| {
-        if list.iter().all(|c| c.settings != settings) && hrr::render::chosen(scene, &settings).is_ok() {
-            list.push(Contender { name, biased: biased(&settings), settings });
-        }
-    };
-    add(base.integrator.name().into(), base.clone());
-    let main = [Integrator::Pt, Integrator::Bpt, Integrator::Lvc, Integrator::LvcHrr, Integrator::PcbptHrr];
-    for integrator in main.into_iter().chain((!quick).then_some(Integrator::VcmHrr)) {
-        add(integrator.name().into(), Settings { integrator, ..base.clone() });
-    }
-    if quick {
-        return Ok(list);
-    }
-    let knob = |change: &dyn Fn(&mut Settings)| {
-        let mut changed = base.clone();
-        change(&mut changed);
-        changed
-    };
-    let has_light = !matches!(base.integrator, Integrator::Pt);
-    if has_light {
-        for factor in [0.1, 10.0] {
-            let subpaths = (base.light_subpaths as f64 * factor).max(1.0) as u64;
-            add(format!("light subpaths x {factor}"), knob(&|s| s.light_subpaths = subpaths));
-        }
-        add("power heuristic".into(), knob(&|s| s.mis = Heuristic::Power));
-    }
-    if Recipe::of(base.integrator).is_some_and(|r| r.roulette) {
-        for expected in [0.1, 10.0, 100.0] {
-            add(format!("expected {expected}"), knob(&|s| s.expected = expected));
-        }
-        add("guiding off".into(), knob(&|s| s.guiding = Switch::Off));
-        add("all stored".into(), knob(&|s| s.storing = 1.0));
-        add("hrr_alpha 0.05".into(), knob(&|s| s.hrr_alpha = 0.05));
-    }
-    if cfg!(feature = "embree") {
-        add("obvhs".into(), knob(&|s| s.visibility = hrr::settings::Backend::Obvhs));
-    }
-    Ok(list)
-}
-
 fn about(
     scene: &Scene,
     settings: &Settings,
@@ -338,6 +301,17 @@ fn report(args: &CostArgs, results: &Results, log: &Log) -> Result<u8> {
             .collect(),
     });
     let pictures = pictures.filter(|p| !p.settings.is_empty());
+    let beside = |name: &str| folder == args.directory && folder.join(name).is_file();
+    let images: Vec<(String, String)> = std::iter::once("reference")
+        .chain(curves.iter().map(|c| c.name.as_str()))
+        .map(|name| (name.to_owned(), format!("{}.png", slug(name))))
+        .filter(|(_, file)| beside(file))
+        .collect();
+    for figure in figures(&curves) {
+        let path = args.directory.join(format!("{}.svg", figure.name));
+        file::replace(&path, chart::file(&figure.svg).as_bytes())?;
+    }
+    file::replace(&args.directory.join("report.md"), markdown(results, &curves, &images).as_bytes())?;
     let path = args.directory.join("report.html");
     file::replace(&path, page(results, &curves, pictures.as_ref()).as_bytes())?;
     for sentence in sentences(&curves) {

@@ -11,6 +11,7 @@ mod progress;
 mod reference;
 mod render;
 mod scene_args;
+mod sweep;
 
 use args::Command;
 use log::{Log, Verbosity};

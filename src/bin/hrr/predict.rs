@@ -72,7 +72,7 @@ pub fn run(args: &PredictArgs, log: &Log) -> Result<u8> {
     }
     let contenders = [Contender { name: name.into(), settings: settings.clone(), biased: false }];
     let (study, tail) = observed(log, settings.threads, args.seconds, |tell| {
-        let study = study::run(&scene, &contenders, args.runs, args.seconds, None, tell)?;
+        let study = study::run(&scene, &contenders, args.runs, args.seconds, None, 0.0, tell)?;
         let iterations = study.longest[0].max(16);
         let probe = Settings { time: None, error: None, iterations, ..settings.clone() };
         let tail = hrr::render::render(&scene, &probe, &hrr::render::Silent)?.noise.error();

@@ -19,6 +19,7 @@ pub(super) use nested::Nested;
 pub use pregenerated::Pregenerated;
 
 use crate::sampler::counter::mix;
+use crate::settings::MinimumRule;
 use crate::vertex_bvh::{NodeId, WIDTH};
 use fearless_simd::{Simd, f32x8, prelude::*, u32x8};
 
@@ -91,6 +92,16 @@ fn fine_unit(bits: u64) -> f64 {
 }
 
 impl MinimumRandom {
+    /// The rule that a setting names; `None` for [`Pregenerated`] numbers.
+    pub fn of(rule: MinimumRule) -> Option<Self> {
+        match rule {
+            MinimumRule::Nested => Some(Self::Nested),
+            MinimumRule::SemiStratified => Some(Self::SemiStratified),
+            MinimumRule::Exact => Some(Self::Exact),
+            MinimumRule::Pregenerated => None,
+        }
+    }
+
     /// The root's number; `leaves` at least 1.
     pub fn root(self, key: u64, leaves: f64) -> Minimum {
         let u = fine_unit(mix(key ^ ROOT));

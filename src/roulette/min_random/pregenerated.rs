@@ -66,6 +66,11 @@ impl Pregenerated {
         self.len == 0
     }
 
+    /// Bytes of the minima.
+    pub fn bytes(&self) -> usize {
+        size_of_val(&self.minima[..])
+    }
+
     /// The number of the light vertex in a place of the tree (block times eight plus lane).
     #[inline]
     pub fn number(&self, place: usize) -> f64 {
