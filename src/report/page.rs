@@ -17,13 +17,13 @@ pub struct Pictures {
 }
 
 const STYLE: &str = "\
-body{font:16px/1.5 system-ui,sans-serif;max-width:860px;margin:2em auto;padding:0 1em;color:#1c1c1c;background:#fff}\
-h1{font-size:1.6em}h2{font-size:1.2em;margin-top:2em}table{border-collapse:collapse;font-size:.9em}\
-td,th{padding:.3em .7em;border-bottom:1px solid #ddd;text-align:right}td:first-child,th:first-child{text-align:left}\
-svg{width:100%;height:auto}.lead li{margin:.4em 0}\
+body{font:16px/1.5 system-ui,sans-serif;max-width:1080px;margin:2em auto;padding:0 1em;color:#1c1c1c;background:#fff}\
+h1{font-size:1.6em}h2{font-size:1.2em;margin-top:2em}table{border-collapse:collapse;font-size:.82em}\
+td,th{padding:.25em .6em;white-space:nowrap;border-bottom:1px solid #ddd;text-align:right}td:first-child,th:first-child{text-align:left}\
+svg{width:100%;height:auto}.lead li{margin:.4em 0}.wide{overflow-x:auto}small{color:#666}\
 #slider{position:relative;width:100%;max-width:720px;line-height:0}#slider img{width:100%;image-rendering:pixelated}\
 #front{position:absolute;inset:0;clip-path:inset(0 50% 0 0)}#map{width:100%;max-width:720px;image-rendering:pixelated}\
-input[type=range]{width:100%;max-width:720px}.about{font-size:.85em;color:#444;overflow-wrap:anywhere}";
+input[type=range]{width:100%;max-width:720px}.about{font-size:.85em;color:#444;overflow-wrap:anywhere}.about td{white-space:normal}";
 
 const SCRIPT: &str = "\
 const get=id=>document.getElementById(id),knob=get('knob'),pick=get('pick');\
@@ -153,17 +153,45 @@ pub fn sentences(curves: &[Curve]) -> Vec<String> {
         }
     }
     if let Some(first) = curves.first() {
+        let mut open = Vec::new();
         for c in &curves[1..] {
             let s = c.speedup;
+            if s.value.is_finite() && c.is_unresolved() {
+                open.push(format!("{} ({} to {})", c.name, number(s.low), number(s.high)));
+                continue;
+            }
             said.push(if !s.value.is_finite() {
-                format!("Between {} and {} nothing can be said: an error was too small to measure.", c.name, first.name)
-            } else if c.is_unresolved() {
-                format!("{} and {} are not told apart: their times to equal error differ by a factor of {} to {}.", c.name, first.name, number(s.low), number(s.high))
+                format!(
+                    "Between {} and {} nothing can be said: an error was too small to measure.",
+                    c.name, first.name
+                )
             } else if s.value > 1.0 {
-                format!("{} reaches the error of {} in {} of its time: {} times as fast ({} to {}).", c.name, first.name, percent(1.0 / s.value), number(s.value), number(s.low), number(s.high))
+                format!(
+                    "{} reaches the error of {} in {} of its time: {} times as fast ({} to {}).",
+                    c.name,
+                    first.name,
+                    percent(1.0 / s.value),
+                    number(s.value),
+                    number(s.low),
+                    number(s.high)
+                )
             } else {
-                format!("{} takes {} times as long as {} to the same error ({} to {}).", c.name, number(1.0 / s.value), first.name, number(1.0 / s.high), number(1.0 / s.low))
+                format!(
+                    "{} takes {} times as long as {} to the same error ({} to {}).",
+                    c.name,
+                    number(1.0 / s.value),
+                    first.name,
+                    number(1.0 / s.high),
+                    number(1.0 / s.low)
+                )
             });
+        }
+        if !open.is_empty() {
+            said.push(format!(
+                "Not told apart from {}, with the speeds that are possible: {}.",
+                first.name,
+                open.join(", ")
+            ));
         }
     }
     let predictions: Vec<_> = curves.iter().filter_map(|c| c.prediction.as_ref()).collect();
@@ -245,11 +273,17 @@ pub(super) fn cells(curves: &[Curve]) -> Vec<[String; COLUMNS.len()]> {
 
 fn table(curves: &[Curve]) -> String {
     let row = |tag: &str, cells: &[String]| {
-        let cells: String = cells.iter().map(|c| format!("<{tag}>{}</{tag}>", escape(c))).collect();
+        // An interval stands below its number.
+        let text = |c: &String| escape(c).replacen(" (", "<br><small>(", 1);
+        let end = |c: &String| if c.contains(" (") { "</small>" } else { "" };
+        let cells: String = cells.iter().map(|c| format!("<{tag}>{}{}</{tag}>", text(c), end(c))).collect();
         format!("<tr>{cells}</tr>\n")
     };
     let body: String = cells(curves).iter().map(|line| row("td", line)).collect();
-    format!("<table id=\"settings\">{}{body}</table>\n", row("th", &COLUMNS.map(String::from)))
+    format!(
+        "<div class=\"wide\"><table id=\"settings\">{}{body}</table></div>\n",
+        row("th", &COLUMNS.map(String::from))
+    )
 }
 
 fn line(c: &Curve) -> Line {
