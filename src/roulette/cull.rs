@@ -11,6 +11,9 @@ use std::cell::RefCell;
 /// Lobes of a query that take part in culling; with more, every vertex is tested.
 pub const MAX_LOBES: usize = 8;
 
+/// For the roundings after the bound itself.
+const SLACK: f32 = 1.00001;
+
 /// Nodes of one level that are taken up together. They are independent work for the processor, which a chain of
 /// single visits, each as long as its latencies, is not.
 const CHUNK: usize = 8;
@@ -176,8 +179,8 @@ impl Walk<'_> {
             return live;
         }
         let boxes = self.bvh.boxes(node);
-        let center = Vec8::relative(simd, &boxes.center, self.high, self.low);
-        live & self.touched::<S, false>(numbers, Box8::new(simd, center, &boxes.half))
+        let center = Vec8::load(simd, &boxes.center).relative(self.high, self.low);
+        live & self.touched::<S, false>(numbers, Box8::new(center, Vec8::load(simd, &boxes.half)))
     }
 
     /// The vertices of a block that the range may touch.
@@ -188,7 +191,7 @@ impl Walk<'_> {
             return live;
         }
         let block = &self.bvh.blocks()[node.index as usize];
-        let points = Vec8::relative(simd, &block.position, self.high, self.low);
+        let points = Vec8::load(simd, &block.position).relative(self.high, self.low);
         live & self.touched::<S, true>(numbers, Box8::around_points(points))
     }
 
@@ -205,8 +208,6 @@ impl Walk<'_> {
     /// The lanes whose boxes may hold a vertex with a probability above the numbers.
     #[inline(always)]
     fn touched<S: Simd, const POINTS: bool>(&self, numbers: f32x8<S>, boxes: Box8<S>) -> u32 {
-        /// For the roundings after the bound itself.
-        const SLACK: f32 = 1.00001;
         if let [lobe] = self.lobes {
             let b = boxes.bound::<POINTS>(lobe);
             return (b * b * numbers).simd_gt(SLACK).to_bitmask() as u32 ^ 0xff;

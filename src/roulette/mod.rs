@@ -20,6 +20,9 @@ mod plane;
 pub use cull::{MAX_LOBES, query, query_brute_force};
 pub use lobe::{Lobe, Range};
 pub use min_random::{MinimumRandom, Pregenerated};
+/// The node test, for trees of other widths to be measured with (`benches/support/widths`).
+#[doc(hidden)]
+pub use plane::{Box8, FlatLobe, Vec8};
 
 use glam::DVec3;
 

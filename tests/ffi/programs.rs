@@ -138,15 +138,17 @@ fn a_host_with_a_path_tracer_of_its_own() {
 #[cfg(feature = "embree")]
 #[test]
 fn a_host_with_an_embree_scene_of_its_own() {
-    let mut compiler = cpp("c++17");
-    if let Some(directory) = std::env::var_os("EMBREE4_ROOT") {
-        // As the system's headers: their warnings are theirs.
-        compiler.arg("-isystem").arg(Path::new(&directory).join("include"));
-        let library = Path::new(&directory).join("lib");
-        compiler.arg("-L").arg(&library).arg(format!("-Wl,-rpath,{}", library.display()));
+    for shared in [true, false] {
+        let mut compiler = cpp("c++17");
+        if let Some(directory) = std::env::var_os("EMBREE4_ROOT") {
+            // As the system's headers: their warnings are theirs.
+            compiler.arg("-isystem").arg(Path::new(&directory).join("include"));
+            let library = Path::new(&directory).join("lib");
+            compiler.arg("-L").arg(&library).arg(format!("-Wl,-rpath,{}", library.display()));
+        }
+        compiler.arg("-Wl,--no-as-needed").arg("-lembree4");
+        compile_and_run(compiler, "embree_host.cpp", shared);
     }
-    compiler.arg("-Wl,--no-as-needed").arg("-lembree4");
-    compile_and_run(compiler, "embree_host.cpp", true);
 }
 
 #[test]
