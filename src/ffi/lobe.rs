@@ -118,7 +118,12 @@ impl Lobes {
             // SAFETY: below `count`, which the caller vouches for; NULL stays NULL.
             let lobe =
                 unsafe { pointer::copy(lobes.wrapping_add(if lobes.is_null() { 0 } else { i }), "lobes") }?;
-            self.0.push(lobe.check(|| format!("lobes[{i}]"))?);
+            // Not by way of a result, which is a lobe more to be carried about.
+            if lobe.is_exact() {
+                self.0.push(lobe.lobe());
+            } else {
+                self.0.push(lobe.check_closely(format!("lobes[{i}]"))?);
+            }
         }
         Ok(&self.0)
     }

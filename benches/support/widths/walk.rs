@@ -12,7 +12,7 @@ const LANES: usize = 8;
 const SLACK: f32 = 1.00001;
 const MAX_LEVELS: usize = 16;
 /// As in the library: nodes of one level that are taken up together. Of nodes of 4 twice as many, for as many registers.
-const fn chunk(width: usize) -> usize {
+const fn taken(width: usize) -> usize {
     if width < LANES { 16 } else { 8 }
 }
 const MOST: usize = 16;
@@ -40,7 +40,7 @@ impl<const N: usize> Lanes<N> {
     const TOGETHER: usize = LANES.div_ceil(N);
     const BITS: u32 = N.ilog2();
     /// What tells the lanes' draws apart.
-    const OFFSETS: [u32; N] = {
+    const OFFSETS: &'static [u32; N] = &{
         let (mut offsets, mut i) = ([0; N], 0);
         while i < N {
             offsets[i] = (i as u32 + 1).wrapping_mul(0x9e37_79b9);
@@ -49,7 +49,7 @@ impl<const N: usize> Lanes<N> {
         offsets
     };
     /// Products in the field of N elements: x -> a x + b deals strata, pairwise uniform.
-    const PRODUCTS: [[u32; N]; N] = {
+    const PRODUCTS: &'static [[u32; N]; N] = &{
         let (mut products, mut a) = ([[0; N]; N], 0);
         while a < N {
             let mut x = 0;
@@ -139,11 +139,11 @@ fn deal<S: Simd, const N: usize>(
     let map = hi.map(|hi| (u64::from(hi) * (N * (N - 1)) as u64 >> 32) as usize);
     let products = map.map(|map| &Lanes::<N>::PRODUCTS[map / N + 1]);
     let stratum = integers(simd, products, r) ^ splat::<S, N>(simd, map.map(|map| (map % N) as u32));
-    let offsets = &Lanes::<N>::OFFSETS;
+    let offsets = Lanes::<N>::OFFSETS;
     let mut x = integers(simd, [offsets, offsets], r) + splat::<S, N>(simd, lo);
     x = ((x ^ (x >> 16)) * 0x7feb_352d) ^ splat::<S, N>(simd, hi);
     x = (x ^ (x >> 15)) * 0x846c_a68b;
-    x ^= x >> 16;
+    x = x ^ (x >> 16);
     let below = 24 - Lanes::<N>::BITS;
     let number: f32x8<S> = ((stratum << below) | (x >> (32 - below))).bitcast::<i32x8<S>>().to_float();
     let scale = (1.0 / (1u64 << below) as f64 / capacity as f64) as f32;
@@ -205,7 +205,7 @@ impl<const W: usize, const B: usize> Walk<'_, W, B> {
         let mut first = [0; MAX_LEVELS];
         let (mut level, mut top) = (root, 1);
         loop {
-            let most = if level == 0 { chunk(B) } else { chunk(W) };
+            let most = if level == 0 { taken(B) } else { taken(W) };
             let count = (top - first[level]).min(most);
             if count == 0 {
                 if level == root {
