@@ -96,18 +96,18 @@ pub fn widths() {
     let points = light_vertices(VERTICES);
     let library: Box<dyn Variant> = Box::new(VertexBvh::new());
     let mut variants = vec![("library 8 x 8".to_owned(), library)];
-    let shapes: [(&str, fn() -> Box<dyn Variant>); _] = [
-        ("8 x 8", own::<8, 8>),
-        ("4 x 8", own::<4, 8>),
-        ("16 x 8", own::<16, 8>),
-        ("8 x 4", own::<8, 4>),
-        ("8 x 16", own::<8, 16>),
-        ("8 x 32", own::<8, 32>),
-        ("4 x 4", own::<4, 4>),
-        ("4 x 16", own::<4, 16>),
-        ("16 x 16", own::<16, 16>),
+    let shapes = [
+        ("8 x 8", own::<8, 8>()),
+        ("4 x 8", own::<4, 8>()),
+        ("16 x 8", own::<16, 8>()),
+        ("8 x 4", own::<8, 4>()),
+        ("8 x 16", own::<8, 16>()),
+        ("8 x 32", own::<8, 32>()),
+        ("4 x 4", own::<4, 4>()),
+        ("4 x 16", own::<4, 16>()),
+        ("16 x 16", own::<16, 16>()),
     ];
-    variants.extend(shapes.map(|(name, new)| (name.to_owned(), new())));
+    variants.extend(shapes.map(|(name, tree)| (name.to_owned(), tree)));
 
     let mut built = vec![f64::INFINITY; variants.len()];
     for _ in 0..BUILDS {

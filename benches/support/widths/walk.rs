@@ -136,7 +136,7 @@ fn deal<S: Simd, const N: usize>(
     r: usize,
 ) -> f32x8<S> {
     let (lo, hi) = (bits.map(|b| b as u32), bits.map(|b| (b >> 32) as u32));
-    let map = hi.map(|hi| (u64::from(hi) * (N * (N - 1)) as u64 >> 32) as usize);
+    let map = hi.map(|hi| ((u64::from(hi) * (N * (N - 1)) as u64) >> 32) as usize);
     let products = map.map(|map| &Lanes::<N>::PRODUCTS[map / N + 1]);
     let stratum = integers(simd, products, r) ^ splat::<S, N>(simd, map.map(|map| (map % N) as u32));
     let offsets = Lanes::<N>::OFFSETS;
