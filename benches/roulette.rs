@@ -5,6 +5,8 @@
 mod against_rays;
 #[path = "support/variance.rs"]
 mod variance;
+#[path = "support/widths/mod.rs"]
+mod widths;
 #[path = "support/workload.rs"]
 mod workload;
 
@@ -133,6 +135,7 @@ fn main() {
         ("growth", growth),
         ("rules", variance::rules),
         ("ranges", variance::ranges),
+        ("widths", widths::widths),
     ];
     for (name, part) in parts {
         if wanted.is_empty() || wanted.iter().any(|w| w == name) {

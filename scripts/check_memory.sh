@@ -4,6 +4,7 @@
 # (examples/c/threads.cpp) under the thread sanitizer. Needs a C and C++ compiler, and valgrind, or says what it skips.
 #
 #   scripts/check_memory.sh [ARGUMENTS]     ARGUMENTS are cargo's; default: --no-default-features
+#   HRR_LIBRARY=libhrr.so scripts/check_memory.sh     checks a library that is there already
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 
@@ -12,8 +13,11 @@ scratch=$(mktemp -d)
 trap 'rm -rf "$scratch"' EXIT
 say() { echo "check_memory: $*" >&2; }
 
-cargo rustc --lib --crate-type cdylib --message-format json-render-diagnostics "$@" >"$scratch/messages"
-library=$(sed -n 's/.*"filenames":\["\([^"]*\/libhrr[^"]*\)".*/\1/p' "$scratch/messages" | tail -n 1)
+library=${HRR_LIBRARY-}
+if [ -z "$library" ]; then
+    cargo rustc --lib --crate-type cdylib --message-format json-render-diagnostics "$@" >"$scratch/messages"
+    library=$(sed -n 's/.*"filenames":\["\([^"]*\/libhrr[^"]*\)".*/\1/p' "$scratch/messages" | tail -n 1)
+fi
 cp "$library" "$scratch/libhrr.so"
 link=(-g -O1 -Iinclude -L"$scratch" -Wl,-rpath,"$scratch" -lhrr -lpthread -lm)
 every=(tests/ffi/every_function.c -std=c99 -D_POSIX_C_SOURCE=200809L)

@@ -2,6 +2,8 @@
 
 #![no_main]
 
+#[path = "../../tests/support/bytes.rs"]
+mod bytes;
 #[path = "../../tests/support/calls_of_bytes.rs"]
 mod calls_of_bytes;
 

@@ -2,6 +2,8 @@
 
 #![no_main]
 
+#[path = "../../tests/support/bytes.rs"]
+mod bytes;
 #[path = "../../tests/support/query_of_bytes.rs"]
 mod query_of_bytes;
 

@@ -59,7 +59,7 @@ impl Seen {
 /// A query that was made and checked.
 pub(super) struct Made<'a> {
     pub cache: &'a HrrCache,
-    pub ask: &'a HrrQuery,
+    pub ask: HrrQuery,
     pub lobes: &'a [Lobe],
     pub rule: MinimumRandom,
     pub brute_force: bool,
@@ -122,7 +122,7 @@ impl Recording {
 }
 
 fn query_bytes(made: &Made<'_>) -> Vec<u8> {
-    let ask = made.ask;
+    let ask = &made.ask;
     let mut bytes = Vec::with_capacity(64 + made.lobes.len() * 96);
     let mut numbers = |numbers: &[f64]| bytes.extend(numbers.iter().flat_map(|x| x.to_bits().to_le_bytes()));
     numbers(&ask.position);

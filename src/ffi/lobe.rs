@@ -46,28 +46,61 @@ impl From<Lobe> for HrrLobe {
 
 impl HrrLobe {
     /// The library's lobe; `name` for the message.
-    #[inline]
+    #[inline(always)]
     pub(super) fn check(&self, name: impl Fn() -> String) -> Outcome<Lobe> {
+        // A copy, so that the numbers of a sound lobe need not lie in memory for the sake of the message.
+        if self.is_exact() { Ok(self.lobe()) } else { (*self).check_closely(name()) }
+    }
+
+    /// Whether there is nothing to say against a lobe and nothing to make good. No number that is not finite passes.
+    #[inline(always)]
+    fn is_exact(&self) -> bool {
+        let [x, y, z] = [self.x, self.y, self.z].map(DVec3::from_array);
+        let one = |v: DVec3| (v.length_squared() - 1.0).abs() <= EXACT;
+        let none = |a: DVec3, b: DVec3| a.dot(b).abs() <= EXACT;
+        let alpha = |alpha: f64| (alpha > 0.0) & (alpha <= 1.0);
+        // Without a branch for each.
+        one(x)
+            & one(y)
+            & one(z)
+            & none(x, y)
+            & none(y, z)
+            & none(z, x)
+            & alpha(self.alpha_x)
+            & alpha(self.alpha_y)
+            & (self.weight >= 0.0)
+            & (self.weight <= f64::MAX)
+    }
+
+    #[inline(always)]
+    fn lobe(&self) -> Lobe {
+        let [x, y, z] = [self.x, self.y, self.z].map(DVec3::from_array);
+        Lobe::new(Frame { x, y, z }, self.alpha_x, self.alpha_y, self.weight)
+    }
+
+    /// What is wrong with a lobe, or the lobe with its frame made good.
+    #[cold]
+    fn check_closely(self, name: String) -> Outcome<Lobe> {
         let [x, y, z] = [self.x, self.y, self.z].map(DVec3::from_array);
         let numbers = [self.alpha_x, self.alpha_y, self.weight];
         if !(x.is_finite() && y.is_finite() && z.is_finite() && numbers.iter().all(|n| n.is_finite())) {
-            return Err(Failure::non_finite(format!("{} is not finite: {self:?}", name())));
+            return Err(Failure::non_finite(format!("{name} is not finite: {self:?}")));
         }
         let lengths = [x, y, z].map(|v| (v.length_squared() - 1.0).abs());
         let angles = [x.dot(y), y.dot(z), z.dot(x)].map(f64::abs);
         let off = lengths.into_iter().chain(angles).fold(0.0, f64::max);
         if !(off <= FORGIVEN) {
-            return Err(Failure::argument(format!("{}: x, y, z are not orthonormal: {self:?}", name())));
+            return Err(Failure::argument(format!("{name}: x, y, z are not orthonormal: {self:?}")));
         }
         let alphas = self.alpha_x.min(self.alpha_y) > 0.0 && self.alpha_x.max(self.alpha_y) <= 1.0;
         if !alphas || self.weight < 0.0 {
-            let message =
-                format!("{}: alpha_x, alpha_y must be in (0,1], weight at least 0: {self:?}", name());
+            let message = format!("{name}: alpha_x, alpha_y must be in (0,1], weight at least 0: {self:?}");
             return Err(Failure::argument(message));
         }
         // Culling counts on an exact frame; the lobe does not tell y from -y.
-        let frame = if off <= EXACT { Frame { x, y, z } } else { Frame::from_z_tangent(z.normalize(), x) };
-        Ok(Lobe::new(frame, self.alpha_x, self.alpha_y, self.weight))
+        let Frame { x, y, z } = Frame::from_z_tangent(z.normalize(), x);
+        let [x, y, z] = [x, y, z].map(|v| v.to_array());
+        Ok(Self { x, y, z, ..self }.lobe())
     }
 }
 
@@ -76,7 +109,7 @@ impl HrrLobe {
 pub(super) struct Lobes(SmallVec<[Lobe; MAX_LOBES]>);
 
 impl Lobes {
-    #[inline]
+    #[inline(always)]
     pub unsafe fn read(&mut self, lobes: *const HrrLobe, count: u32) -> Outcome<&[Lobe]> {
         if count > HRR_MAX_LOBES {
             return Err(Failure::argument(format!("{count} lobes: at most {HRR_MAX_LOBES}")));
@@ -85,19 +118,29 @@ impl Lobes {
             // SAFETY: below `count`, which the caller vouches for; NULL stays NULL.
             let lobe =
                 unsafe { pointer::copy(lobes.wrapping_add(if lobes.is_null() { 0 } else { i }), "lobes") }?;
-            self.0.push(lobe.check(|| format!("lobes[{i}]"))?);
+            // Not by way of a result, which is a lobe more to be carried about.
+            if lobe.is_exact() {
+                self.0.push(lobe.lobe());
+            } else {
+                self.0.push(lobe.check_closely(format!("lobes[{i}]"))?);
+            }
         }
         Ok(&self.0)
     }
 }
 
 /// The C of a query: finite, at least 0.
+#[inline(always)]
 pub(super) fn constant(c: f64) -> Outcome<f64> {
-    match c {
-        _ if !c.is_finite() => Err(Failure::non_finite(format!("constant is {c}"))),
-        _ if c < 0.0 => Err(Failure::argument(format!("constant is {c}: it is an area"))),
-        _ => Ok(c),
+    #[cold]
+    fn wrong(c: f64) -> Failure {
+        if c.is_finite() {
+            Failure::argument(format!("constant is {c}: it is an area"))
+        } else {
+            Failure::non_finite(format!("constant is {c}"))
+        }
     }
+    if (0.0..=f64::MAX).contains(&c) { Ok(c) } else { Err(wrong(c)) }
 }
 
 /// A direction of about unit length.

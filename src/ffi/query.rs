@@ -139,20 +139,30 @@ pub(super) fn rule_number(rule: MinimumRandom) -> u32 {
     }
 }
 
-/// Answers a query; `visit` gets every hit, and its index in the build.
+/// What makes no query of a host's.
+#[cold]
+fn wrong(ask: HrrQuery) -> Failure {
+    if ask.mask == 0 {
+        return Failure::argument("query->mask is 0: no light vertex shares a bit with it");
+    }
+    Failure::non_finite(format!("query->position is {}", DVec3::from_array(ask.position)))
+}
+
+/// Answers a query; `visit` gets every hit.
+///
+/// Part of the functions that call it, and the query in their registers: what a host has written number by number just
+/// before is not to be read again in other pieces, which would wait until the writing is done.
+#[inline(always)]
 pub(super) unsafe fn run(
     cache: &HrrCache,
-    ask: &HrrQuery,
+    ask: HrrQuery,
     options: Options,
     counters: &mut QueryCounters,
-    mut visit: impl FnMut(u32, HrrHit),
+    mut visit: impl FnMut(HrrHit),
 ) -> Outcome {
     let position = DVec3::from_array(ask.position);
-    if !position.is_finite() {
-        return Err(Failure::non_finite(format!("query->position is {position}")));
-    }
-    if ask.mask == 0 {
-        return Err(Failure::argument("query->mask is 0: no light vertex shares a bit with it"));
+    if !position.is_finite() || ask.mask == 0 {
+        return Err(wrong(ask));
     }
     let mut read = Lobes::default();
     // SAFETY: passed on.
@@ -167,7 +177,7 @@ pub(super) unsafe fn run(
         if captured {
             seen.add(id, probability);
         }
-        visit(index, HrrHit { id, probability });
+        visit(HrrHit { id, probability });
     };
     if options.brute_force {
         query_brute_force(bvh, &inner, counters, &mut found);
@@ -179,6 +189,43 @@ pub(super) unsafe fn run(
         cache.capture.record(&Made { cache, ask, lobes, rule, brute_force, seen });
     }
     Ok(())
+}
+
+/// The room that a host has for hits, and how many there are.
+pub(super) struct Hits {
+    room: Option<Out<HrrHit>>,
+    capacity: u64,
+    count: u64,
+}
+
+impl Hits {
+    #[inline(always)]
+    pub unsafe fn new(hits: *mut HrrHit, capacity: u64) -> Outcome<Self> {
+        // SAFETY: passed on.
+        let room = if capacity == 0 { None } else { Some(unsafe { Out::new(hits, "hits") }?) };
+        Ok(Self { room, capacity, count: 0 })
+    }
+
+    /// Writes a hit where there is room for it.
+    #[inline(always)]
+    pub fn push(&mut self, hit: HrrHit) {
+        if let Some(room) = self.room.as_ref().filter(|_| self.count < self.capacity) {
+            // SAFETY: below the capacity, which the caller of `new` vouches for.
+            unsafe { room.write_at(self.count as usize, hit) };
+        }
+        self.count += 1;
+    }
+
+    /// Says how many there are; fails when there is no room for them.
+    #[inline(always)]
+    pub fn finish(self, out_count: Out<u64>) -> Outcome {
+        #[cold]
+        fn too_many(count: u64, capacity: u64) -> Failure {
+            Failure::new(HRR_ERROR_BUFFER_TOO_SMALL, format!("{count} hits, capacity is {capacity}"))
+        }
+        out_count.write(self.count);
+        if self.count > self.capacity { Err(too_many(self.count, self.capacity)) } else { Ok(()) }
+    }
 }
 
 /// Key of a query's random numbers, well mixed, for a seed, an iteration (or sample), a pixel and a depth (with which
@@ -213,25 +260,13 @@ pub unsafe extern "C" fn hrr_query(
             let cache = pointer::object(cache, "cache")?;
             let ask = pointer::copy(query, "query")?;
             let options = Options::read(options)?;
-            let hits = if capacity == 0 { None } else { Some(Out::new(hits, "hits")?) };
+            let mut hits = Hits::new(hits, capacity)?;
             let out_count = Out::new(out_count, "out_count")?;
             let counters = Out::optional(counters, "counters")?;
-            let mut count = 0;
-            run(cache, &ask, options, &mut did, |_, hit| {
-                // SAFETY: below the capacity.
-                if let Some(hits) = hits.as_ref().filter(|_| count < capacity) {
-                    hits.write_at(count as usize, hit);
-                }
-                count += 1;
-            })?;
+            run(cache, ask, options, &mut did, |hit| hits.push(hit))?;
             add(counters, &did);
-            out_count.write(count);
-            if count > capacity {
-                let message = format!("{count} hits, capacity is {capacity}");
-                return Err(Failure::new(HRR_ERROR_BUFFER_TOO_SMALL, message));
-            }
+            hits.finish(out_count)
         }
-        Ok(())
     })
 }
 
@@ -259,7 +294,7 @@ pub unsafe extern "C" fn hrr_query_visit(
             let visit = visit.ok_or_else(|| Failure::argument("visit is NULL"))?;
             let counters = Out::optional(counters, "counters")?;
             let mut answer = 0;
-            run(cache, &ask, options, &mut did, |_, hit| {
+            run(cache, ask, options, &mut did, |hit| {
                 if answer == 0 {
                     answer = visit(user, &hit);
                 }

@@ -4,8 +4,8 @@ use super::cache::HrrCache;
 use super::geometry::HrrGeometry;
 use super::pointer::{self, Out, Strided};
 use super::points::Points;
-use super::query::{HrrCounters, HrrHit, HrrQuery, HrrQueryOptions, Options, add, run};
-use super::status::{Failure, HRR_ERROR_BUFFER_TOO_SMALL, HrrStatus, Outcome, guard};
+use super::query::{Hits, HrrCounters, HrrHit, HrrQuery, HrrQueryOptions, Options, add, run};
+use super::status::{Failure, HrrStatus, Outcome, guard};
 use crate::geometry::SurfacePoint;
 use crate::roulette::QueryCounters;
 use crate::visibility::{Ray, offset};
@@ -80,6 +80,31 @@ fn ray(geometry: &HrrGeometry, ray: &HrrRay, name: impl Fn() -> String) -> Outco
     Ok(Ray { origin, direction, t_min, t_max })
 }
 
+/// Does something with each ray of a host's and writes what comes of it.
+unsafe fn each_ray<T>(
+    geometry: *const HrrGeometry,
+    rays: *const HrrRay,
+    ray_stride: usize,
+    ray_count: u64,
+    (out, name): (*mut T, &str),
+    trace: impl Fn(&HrrGeometry, &Ray) -> T,
+) -> HrrStatus {
+    guard(|| {
+        // SAFETY: this module's contract, which the callers pass on.
+        unsafe {
+            let geometry = pointer::object(geometry, "geometry")?;
+            let count = usize::try_from(ray_count).unwrap_or(usize::MAX);
+            let rays = Strided::new(rays, ray_stride, count, "rays")?;
+            let out = Out::array(out, count, name)?;
+            for i in 0..count {
+                let ray = ray(geometry, &rays.get(i), || format!("rays[{i}]"))?;
+                out.write_at(i, trace(geometry, &ray));
+            }
+        }
+        Ok(())
+    })
+}
+
 /// Finds what rays hit first. rays: ray_count of them, ray_stride bytes apart (0 = packed). hits: room for ray_count.
 /// Any thread, this one only; takes no lock.
 ///
@@ -92,26 +117,15 @@ pub unsafe extern "C" fn hrr_intersect(
     ray_count: u64,
     hits: *mut HrrRayHit,
 ) -> HrrStatus {
-    guard(|| {
-        // SAFETY: this module's contract.
-        unsafe {
-            let geometry = pointer::object(geometry, "geometry")?;
-            let count = usize::try_from(ray_count).unwrap_or(usize::MAX);
-            let rays = Strided::new(rays, ray_stride, count, "rays")?;
-            let hits = Out::array(hits, count, "hits")?;
-            for i in 0..count {
-                let hit =
-                    geometry.visibility().intersect(&ray(geometry, &rays.get(i), || format!("rays[{i}]"))?);
-                let none = HrrRayHit { mesh: HRR_NO_HIT, triangle: 0, u: 0.0, v: 0.0, t: 0.0 };
-                let hit = hit.map_or(none, |hit| {
-                    let (mesh, triangle) = geometry.place(hit.triangle);
-                    HrrRayHit { mesh, triangle, u: hit.u, v: hit.v, t: hit.t }
-                });
-                hits.write_at(i, hit);
-            }
+    let trace = |geometry: &HrrGeometry, ray: &Ray| match geometry.visibility().intersect(ray) {
+        None => HrrRayHit { mesh: HRR_NO_HIT, triangle: 0, u: 0.0, v: 0.0, t: 0.0 },
+        Some(hit) => {
+            let (mesh, triangle) = geometry.place(hit.triangle);
+            HrrRayHit { mesh, triangle, u: hit.u, v: hit.v, t: hit.t }
         }
-        Ok(())
-    })
+    };
+    // SAFETY: this module's contract.
+    unsafe { each_ray(geometry, rays, ray_stride, ray_count, (hits, "hits"), trace) }
 }
 
 /// Finds which rays hit anything: 1, or 0 where the way is free. As hrr_intersect, and out_occluded: room for ray_count.
@@ -126,20 +140,9 @@ pub unsafe extern "C" fn hrr_occluded(
     ray_count: u64,
     out_occluded: *mut u8,
 ) -> HrrStatus {
-    guard(|| {
-        // SAFETY: this module's contract.
-        unsafe {
-            let geometry = pointer::object(geometry, "geometry")?;
-            let count = usize::try_from(ray_count).unwrap_or(usize::MAX);
-            let rays = Strided::new(rays, ray_stride, count, "rays")?;
-            let out = Out::array(out_occluded, count, "out_occluded")?;
-            for i in 0..count {
-                let ray = ray(geometry, &rays.get(i), || format!("rays[{i}]"))?;
-                out.write_at(i, u8::from(geometry.visibility().occluded(&ray)));
-            }
-        }
-        Ok(())
-    })
+    let trace = |geometry: &HrrGeometry, ray: &Ray| u8::from(geometry.visibility().occluded(ray));
+    // SAFETY: this module's contract.
+    unsafe { each_ray(geometry, rays, ray_stride, ray_count, (out_occluded, "out_occluded"), trace) }
 }
 
 /// The ray that leaves a surface in a direction, to infinity: it starts off the surface by what single precision needs,
@@ -283,30 +286,20 @@ pub unsafe extern "C" fn hrr_query_visible(
             let ask = pointer::copy(query, "query")?;
             let options = Options::read(options)?;
             let scenery = Scenery::new(geometry, DVec3::from_array(ask.position), eye_normal, lights)?;
-            let hits = if capacity == 0 { None } else { Some(Out::new(hits, "hits")?) };
+            let mut hits = Hits::new(hits, capacity)?;
             let out_count = Out::new(out_count, "out_count")?;
             let counters = Out::optional(counters, "counters")?;
-            let (mut did, mut count, mut failure) = (QueryCounters::default(), 0, None);
-            run(cache, &ask, options, &mut did, |_, hit| match scenery.occluded(hit.id) {
+            let (mut did, mut failure) = (QueryCounters::default(), None);
+            run(cache, ask, options, &mut did, |hit| match scenery.occluded(hit.id) {
                 Ok(true) => {}
-                Ok(false) => {
-                    if let Some(hits) = hits.as_ref().filter(|_| count < capacity) {
-                        hits.write_at(count as usize, hit);
-                    }
-                    count += 1;
-                }
+                Ok(false) => hits.push(hit),
                 Err(e) => failure = failure.take().or(Some(e)),
             })?;
             if let Some(failure) = failure {
                 return Err(failure);
             }
             add(counters, &did);
-            out_count.write(count);
-            if count > capacity {
-                let message = format!("{count} hits, capacity is {capacity}");
-                return Err(Failure::new(HRR_ERROR_BUFFER_TOO_SMALL, message));
-            }
+            hits.finish(out_count)
         }
-        Ok(())
     })
 }

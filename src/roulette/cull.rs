@@ -12,6 +12,9 @@ use std::cell::RefCell;
 /// Lobes of a query that take part in culling; with more, every vertex is tested.
 pub const MAX_LOBES: usize = 8;
 
+/// For the roundings after the bound itself.
+const SLACK: f32 = 1.00001;
+
 /// Nodes of one level that are taken up together. They are independent work for the processor, which a chain of
 /// single visits, each as long as its latencies, is not.
 const CHUNK: usize = 8;
@@ -185,8 +188,8 @@ impl Walk<'_> {
             return live;
         }
         let boxes = self.bvh.boxes(node);
-        let center = Vec8::relative(simd, &boxes.center, self.high, self.low);
-        live & self.touched::<S, false>(numbers, Box8::new(simd, center, &boxes.half, self.pad))
+        let center = Vec8::load(simd, &boxes.center).relative(self.high, self.low);
+        live & self.touched::<S, false>(numbers, Box8::new(center, Vec8::load(simd, &boxes.half), self.pad))
     }
 
     /// The vertices of a block that the range may touch.
@@ -197,7 +200,7 @@ impl Walk<'_> {
             return live;
         }
         let block = &self.bvh.blocks()[node.index as usize];
-        let points = Vec8::relative(simd, &block.position, self.high, self.low);
+        let points = Vec8::load(simd, &block.position).relative(self.high, self.low);
         live & self.touched::<S, true>(numbers, Box8::around_points(points, self.pad))
     }
 
@@ -214,8 +217,6 @@ impl Walk<'_> {
     /// The lanes whose boxes may hold a vertex with a probability above the numbers.
     #[inline(always)]
     fn touched<S: Simd, const POINTS: bool>(&self, numbers: f32x8<S>, boxes: Box8<S>) -> u32 {
-        /// For the roundings after the bound itself.
-        const SLACK: f32 = 1.00001;
         if let [lobe] = self.lobes {
             let b = boxes.bound::<POINTS>(lobe);
             return (b * b * numbers).simd_gt(SLACK).to_bitmask() as u32 ^ 0xff;

@@ -7,7 +7,7 @@ use glam::Vec3;
 
 /// A lobe as the box test sees it: f32, and scaled so that `h(x) <= 1 / sqrt(xi)` is the roulette's condition.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct FlatLobe {
+pub struct FlatLobe {
     /// World to lobe space: the frame's rows over (alpha_x, alpha_y, 1) sqrt(C c).
     rows: [[f32; 3]; 3],
     /// How far along world axis i a displacement along j must be made good to stay as near to the lobe's axis as
@@ -22,7 +22,7 @@ pub(super) struct FlatLobe {
 }
 
 /// Roundings as a fraction of a box's reach (L1 norms of centre and half extents): of the offset, the rows, the plane.
-pub(super) const PAD: f32 = 6e-7;
+pub const PAD: f32 = 6e-7;
 
 /// The same as a length: what is lost where f32 ends, with denormals flushed to zero.
 const TINY: f32 = 1e-37;
@@ -84,15 +84,19 @@ impl FlatLobe {
 ///
 /// No closures in what follows: one that is not inlined loses the instruction set that the walk was compiled for.
 #[derive(Clone, Copy)]
-pub(super) struct Vec8<S: Simd> {
-    x: f32x8<S>,
-    y: f32x8<S>,
-    z: f32x8<S>,
+pub struct Vec8<S: Simd> {
+    /// First components.
+    pub x: f32x8<S>,
+    /// Second components.
+    pub y: f32x8<S>,
+    /// Third components.
+    pub z: f32x8<S>,
 }
 
 impl<S: Simd> Vec8<S> {
+    /// Eight vectors that lie component by component.
     #[inline(always)]
-    fn load(simd: S, v: &[[f32; 8]; 3]) -> Self {
+    pub fn load(simd: S, v: &[[f32; 8]; 3]) -> Self {
         let [x, y, z] = v;
         Self {
             x: f32x8::load_array_ref(simd, x),
@@ -101,11 +105,14 @@ impl<S: Simd> Vec8<S> {
         }
     }
 
-    /// Eight points relative to a point given in two f32 parts, so that nothing is lost far from the origin.
+    /// The same points relative to one given in two f32 parts, so that nothing is lost far from the origin.
     #[inline(always)]
-    pub fn relative(simd: S, points: &[[f32; 8]; 3], high: [f32; 3], low: [f32; 3]) -> Self {
-        let p = Self::load(simd, points);
-        Self { x: (p.x - high[0]) - low[0], y: (p.y - high[1]) - low[1], z: (p.z - high[2]) - low[2] }
+    pub fn relative(self, high: [f32; 3], low: [f32; 3]) -> Self {
+        Self {
+            x: (self.x - high[0]) - low[0],
+            y: (self.y - high[1]) - low[1],
+            z: (self.z - high[2]) - low[2],
+        }
     }
 
     #[inline(always)]
@@ -136,15 +143,15 @@ impl<S: Simd> Vec8<S> {
 
 /// Eight boxes relative to the eye vertex, grown by what roundings may move: their reach times a pad, by default [`PAD`].
 #[derive(Clone, Copy)]
-pub(super) struct Box8<S: Simd> {
+pub struct Box8<S: Simd> {
     center: Vec8<S>,
     half: Vec8<S>,
 }
 
 impl<S: Simd> Box8<S> {
+    /// Boxes `center +- half`.
     #[inline(always)]
-    pub fn new(simd: S, center: Vec8<S>, half: &[[f32; 8]; 3], pad: f32) -> Self {
-        let half = Vec8::load(simd, half);
+    pub fn new(center: Vec8<S>, half: Vec8<S>, pad: f32) -> Self {
         let pad = (center.abs().sum() + half.sum()).mul_add(pad, TINY);
         Self { center, half: half.add_to_each(pad) }
     }
@@ -251,11 +258,11 @@ mod tests {
         let low = (eye - high.as_dvec3()).as_vec3().to_array();
         let mut out = [0.0; 8];
         dispatch!(Level::new(), simd => {
-            let center = Vec8::relative(simd, &boxes[0], high.to_array(), low);
+            let center = Vec8::load(simd, &boxes[0]).relative(high.to_array(), low);
             let b = if points {
                 Box8::around_points(center, PAD).bound::<true>(&flat)
             } else {
-                Box8::new(simd, center, &boxes[1], PAD).bound::<false>(&flat)
+                Box8::new(center, Vec8::load(simd, &boxes[1]), PAD).bound::<false>(&flat)
             };
             b.store_slice(&mut out);
         });

@@ -62,7 +62,7 @@ impl VertexBvh {
         let place = |(index, &position): (usize, &Vec3)| Placed { position, index: index as u32 };
         order.clear();
         order.par_extend(positions.par_iter().enumerate().map(place));
-        kd::order(order);
+        kd::order::<WIDTH, WIDTH>(order);
         self.fill_blocks(masks);
         self.fill_nodes();
         Ok(())

@@ -1,13 +1,14 @@
 //! The order of vertices in the tree: recursive splits, each at a multiple of a child's capacity, so that every run
 //! of 8^k vertices that the perfect tree makes a node is compact.
 
-use super::WIDTH;
 use glam::Vec3;
 
 /// A vertex on its way to its place.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Placed {
+pub struct Placed {
+    /// Finite.
     pub position: Vec3,
+    /// Among the vertices as they were given.
     pub index: u32,
 }
 
@@ -25,20 +26,20 @@ impl Placed {
 /// Vertices below which a task is not worth handing to another thread.
 const GRAIN: usize = 1 << 11;
 
-/// Puts vertices into tree order.
-pub(super) fn order(vertices: &mut [Placed]) {
-    let mut child = WIDTH;
+/// Puts vertices into the order of a tree of `WIDTH` children a node over blocks of `BLOCK` vertices.
+pub fn order<const WIDTH: usize, const BLOCK: usize>(vertices: &mut [Placed]) {
+    let mut child = BLOCK;
     while child * WIDTH < vertices.len() {
         child *= WIDTH;
     }
-    split(vertices, child);
+    split::<WIDTH, BLOCK>(vertices, child);
 }
 
 /// Orders the vertices of one node whose children hold `child` each.
-fn split(vertices: &mut [Placed], child: usize) {
+fn split<const WIDTH: usize, const BLOCK: usize>(vertices: &mut [Placed], child: usize) {
     if vertices.len() <= child {
-        if child > WIDTH {
-            split(vertices, child / WIDTH);
+        if child > BLOCK {
+            split::<WIDTH, BLOCK>(vertices, child / WIDTH);
         }
         return;
     }
@@ -52,10 +53,10 @@ fn split(vertices: &mut [Placed], child: usize) {
     };
     let (low, high) = vertices.split_at_mut(middle);
     if low.len() + high.len() > GRAIN {
-        rayon::join(|| split(low, child), || split(high, child));
+        rayon::join(|| split::<WIDTH, BLOCK>(low, child), || split::<WIDTH, BLOCK>(high, child));
     } else {
-        split(low, child);
-        split(high, child);
+        split::<WIDTH, BLOCK>(low, child);
+        split::<WIDTH, BLOCK>(high, child);
     }
 }
 

@@ -11,6 +11,10 @@ mod build;
 mod kd;
 mod validate;
 
+/// The order of the vertices, for trees of other widths to be measured with (`benches/support/widths`).
+#[doc(hidden)]
+pub use kd::{Placed, order};
+
 use crate::math::Aabb;
 use glam::Vec3;
 

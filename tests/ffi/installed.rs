@@ -2,28 +2,9 @@
 //!
 //! `cargo test -- --ignored installed` (some minutes: it builds the library twice).
 
-use std::path::{Path, PathBuf};
+use super::support::{root, run, there};
+use std::path::PathBuf;
 use std::process::Command;
-
-fn root() -> &'static Path {
-    Path::new(env!("CARGO_MANIFEST_DIR"))
-}
-
-fn run(command: &mut Command) -> String {
-    let output = command.output().unwrap_or_else(|e| panic!("{command:?}: {e}"));
-    let text = String::from_utf8_lossy(&output.stdout).into_owned();
-    let errors = String::from_utf8_lossy(&output.stderr);
-    assert!(output.status.success(), "{command:?}: {}\n{text}{errors}", output.status);
-    text
-}
-
-fn there(program: &str) -> bool {
-    let there = Command::new(program).arg("--version").output().is_ok();
-    if !there {
-        eprintln!("skipped: there is no {program}");
-    }
-    there
-}
 
 const CMAKE: &str = "cmake_minimum_required(VERSION 3.16)
 project(consumer C CXX)

@@ -1,14 +1,11 @@
 //! Programs in C and C++ that use the library as hosts do: compiled, linked with the shared and with the static
 //! library, run. `CC` and `CXX` name the compilers (default: cc, c++).
 
+use super::support::{root, run, there};
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
 const STRICT: [&str; 5] = ["-Wall", "-Wextra", "-pedantic", "-Werror", "-O1"];
-
-fn root() -> &'static Path {
-    Path::new(env!("CARGO_MANIFEST_DIR"))
-}
 
 fn compiler(variable: &str, default: &str) -> Command {
     Command::new(std::env::var_os(variable).unwrap_or_else(|| default.into()))
@@ -31,14 +28,6 @@ fn libraries() -> PathBuf {
     let directory = std::env::current_exe().unwrap().parent().unwrap().to_owned();
     assert!(directory.join("libhrr.so").exists(), "no libhrr.so in {}", directory.display());
     directory
-}
-
-fn run(command: &mut Command) -> String {
-    let output = command.output().unwrap_or_else(|e| panic!("{command:?}: {e}"));
-    let text = String::from_utf8_lossy(&output.stdout).into_owned();
-    let errors = String::from_utf8_lossy(&output.stderr);
-    assert!(output.status.success(), "{command:?}: {}\n{text}{errors}", output.status);
-    text
 }
 
 /// What a static libhrr needs beside itself: `cargo rustc --lib -- --print native-static-libs`.
@@ -102,8 +91,7 @@ fn headers_compile_alone() {
 
 #[test]
 fn headers_compile_with_clang() {
-    if Command::new("clang").arg("--version").output().is_err() {
-        eprintln!("skipped: there is no clang");
+    if !there("clang") {
         return;
     }
     for (header, language, standard) in [
@@ -138,15 +126,17 @@ fn a_host_with_a_path_tracer_of_its_own() {
 #[cfg(feature = "embree")]
 #[test]
 fn a_host_with_an_embree_scene_of_its_own() {
-    let mut compiler = cpp("c++17");
-    if let Some(directory) = std::env::var_os("EMBREE4_ROOT") {
-        // As the system's headers: their warnings are theirs.
-        compiler.arg("-isystem").arg(Path::new(&directory).join("include"));
-        let library = Path::new(&directory).join("lib");
-        compiler.arg("-L").arg(&library).arg(format!("-Wl,-rpath,{}", library.display()));
+    for shared in [true, false] {
+        let mut compiler = cpp("c++17");
+        if let Some(directory) = std::env::var_os("EMBREE4_ROOT") {
+            // As the system's headers: their warnings are theirs.
+            compiler.arg("-isystem").arg(Path::new(&directory).join("include"));
+            let library = Path::new(&directory).join("lib");
+            compiler.arg("-L").arg(&library).arg(format!("-Wl,-rpath,{}", library.display()));
+        }
+        compiler.arg("-Wl,--no-as-needed").arg("-lembree4");
+        compile_and_run(compiler, "embree_host.cpp", shared);
     }
-    compiler.arg("-Wl,--no-as-needed").arg("-lembree4");
-    compile_and_run(compiler, "embree_host.cpp", true);
 }
 
 #[test]

@@ -2,7 +2,32 @@
 
 use hrr::ffi::*;
 use std::ffi::{CStr, c_void};
+use std::path::Path;
+use std::process::Command;
 use std::{mem, ptr};
+
+/// The project's directory.
+pub fn root() -> &'static Path {
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+}
+
+/// Runs a program, which must succeed, and gives what it wrote.
+pub fn run(command: &mut Command) -> String {
+    let output = command.output().unwrap_or_else(|e| panic!("{command:?}: {e}"));
+    let text = String::from_utf8_lossy(&output.stdout).into_owned();
+    let errors = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{command:?}: {}\n{text}{errors}", output.status);
+    text
+}
+
+/// Whether a program is installed; says so when it is not.
+pub fn there(program: &str) -> bool {
+    let there = Command::new(program).arg("--version").output().is_ok();
+    if !there {
+        eprintln!("skipped: there is no {program}");
+    }
+    there
+}
 
 /// A struct as hosts make it: zeroed, with its size where it has one.
 pub fn zeroed<T: Copy>() -> T {

@@ -3,26 +3,12 @@
 
 #![allow(unsafe_code)]
 
+use super::bytes::Bytes;
 use hrr::ffi::*;
 use std::ffi::{CStr, c_void};
 use std::{mem, ptr};
 
-/// Takes values off the front; zeros when there is no more.
-struct Bytes<'a>(&'a [u8]);
-
 impl Bytes<'_> {
-    fn take<const N: usize>(&mut self) -> [u8; N] {
-        let (head, rest) = self.0.split_at(N.min(self.0.len()));
-        self.0 = rest;
-        let mut out = [0; N];
-        out[..head.len()].copy_from_slice(head);
-        out
-    }
-
-    fn byte(&mut self) -> u8 {
-        self.take::<1>()[0]
-    }
-
     /// Mostly the first of a field's values; now and then any of all.
     fn mostly(&mut self, usual: u32) -> u32 {
         match self.byte() {
@@ -46,7 +32,7 @@ impl Bytes<'_> {
         if self.byte() > 250 { f64::from_le_bytes(self.take()) } else { f64::from(self.byte()) / 64.0 - 2.0 }
     }
 
-    fn vector(&mut self) -> [f64; 3] {
+    fn three(&mut self) -> [f64; 3] {
         [self.number(), self.number(), self.number()]
     }
 }
@@ -118,7 +104,7 @@ impl Host {
         let (size, stride) =
             (if format == HRR_DOUBLE3 { 24 } else { 12 }, 24 + usize::from(bytes.byte() % 16));
         for i in 0..count {
-            let p = bytes.vector();
+            let p = bytes.three();
             let at = &mut memory[i * stride..];
             for axis in 0..3 {
                 if size == 24 {
@@ -168,7 +154,7 @@ impl Host {
             let length = v.iter().map(|x| x * x).sum::<f64>().sqrt();
             if divides(length) { v.map(|x| x / length) } else { v }
         };
-        let (n, t, wo) = (unit(bytes.vector()), bytes.vector(), unit(bytes.vector()));
+        let (n, t, wo) = (unit(bytes.three()), bytes.three(), unit(bytes.three()));
         let alpha = |bytes: &mut Bytes<'_>| {
             if bytes.byte() > 250 {
                 bytes.number()
@@ -184,7 +170,7 @@ impl Host {
                 0 => hrr_lobe_sphere(size, &mut lobe),
                 1 => hrr_lobe_transmission(n.as_ptr(), t, wo.as_ptr(), ax, ay, 1.0 + size, size, &mut lobe),
                 2 => {
-                    lobe = HrrLobe { x: bytes.vector(), y: n, z: wo, alpha_x: ax, alpha_y: ay, weight: size };
+                    lobe = HrrLobe { x: bytes.three(), y: n, z: wo, alpha_x: ax, alpha_y: ay, weight: size };
                     HRR_OK
                 }
                 _ => hrr_lobe_reflection(n.as_ptr(), t, wo.as_ptr(), ax, ay, size, &mut lobe),
@@ -208,7 +194,7 @@ impl Host {
         options.struct_size = size_of::<HrrQueryOptions>() as u32;
         (options.rule, options.reserved) = (bytes.mostly_below(3), bytes.mostly(0));
         let ask = HrrQuery {
-            position: bytes.vector(),
+            position: bytes.three(),
             lobes: self.lobes.as_ptr(),
             lobe_count: self.lobes.len() as u32,
             mask: if bytes.byte() > 200 { u32::from_le_bytes(bytes.take()) } else { u32::MAX },
@@ -266,7 +252,7 @@ impl Host {
         let cache = self.caches[slot];
         let (mut info, mut hash): (HrrCacheInfo, _) = (zeroed(), 0);
         info.struct_size = bytes.mostly(size_of::<HrrCacheInfo>() as u32);
-        let (light, eye) = (bytes.vector(), bytes.vector());
+        let (light, eye) = (bytes.three(), bytes.three());
         let (mut offset, mut p) = ([0.0; 3], -1.0);
         // SAFETY: locals; NULL is refused.
         unsafe {
@@ -284,7 +270,7 @@ impl Host {
     }
 
     fn rays(&mut self, bytes: &mut Bytes<'_>) {
-        let positions: Vec<f64> = (0..12).flat_map(|_| bytes.vector()).collect();
+        let positions: Vec<f64> = (0..12).flat_map(|_| bytes.three()).collect();
         let indices: Vec<u32> = (0..12).map(|_| bytes.mostly_below(12)).collect();
         let meshes = [HrrMesh {
             position: positions.as_ptr().cast(),
@@ -306,7 +292,7 @@ impl Host {
             self.geometry = geometry;
         }
         let t_max = if bytes.byte() > 128 { f64::INFINITY } else { bytes.number() };
-        let ray = HrrRay { origin: bytes.vector(), direction: bytes.vector(), t_min: 0.0, t_max };
+        let ray = HrrRay { origin: bytes.three(), direction: bytes.three(), t_min: 0.0, t_max };
         let (mut hit, mut occluded) = (HrrRayHit { mesh: 7, triangle: 0, u: 0.0, v: 0.0, t: 0.0 }, 9u8);
         // SAFETY: locals; NULL is refused.
         unsafe {

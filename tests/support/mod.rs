@@ -4,6 +4,7 @@
 //! [`stats::Family`], which fails when any of its p-values is too small for their number. Seeds are fixed: a failure
 //! is a defect, not bad luck.
 
+pub mod bytes;
 pub mod chart;
 pub mod distribution;
 pub mod estimate;

@@ -1,5 +1,6 @@
 //! Bytes to light vertices and a query, and what must hold whatever they say. The fuzzer and the test suite share it.
 
+use super::bytes::Bytes;
 use glam::{DVec3, Vec3};
 use hrr::math::Frame;
 use hrr::roulette::{
@@ -7,24 +8,9 @@ use hrr::roulette::{
 };
 use hrr::vertex_bvh::VertexBvh;
 
-/// Takes values off the front; zeros when there is no more.
-struct Bytes<'a>(&'a [u8]);
-
 impl Bytes<'_> {
-    fn take<const N: usize>(&mut self) -> [u8; N] {
-        let (head, rest) = self.0.split_at(N.min(self.0.len()));
-        self.0 = rest;
-        let mut out = [0; N];
-        out[..head.len()].copy_from_slice(head);
-        out
-    }
-
-    fn byte(&mut self) -> u8 {
-        self.take::<1>()[0]
-    }
-
     /// Any bits at all, or a number of everyday size: a search by bytes finds the one seldom, the other hardly ever.
-    fn number(&mut self, wild: bool) -> f64 {
+    fn real(&mut self, wild: bool) -> f64 {
         if wild {
             f64::from_le_bytes(self.take())
         } else {
@@ -33,7 +19,7 @@ impl Bytes<'_> {
     }
 
     fn vector(&mut self, wild: bool) -> DVec3 {
-        DVec3::new(self.number(wild), self.number(wild), self.number(wild))
+        DVec3::new(self.real(wild), self.real(wild), self.real(wild))
     }
 
     /// A length or roughness on a logarithmic scale, 1e-8 .. 10.
@@ -58,7 +44,7 @@ pub fn check(bytes: &[u8]) -> usize {
     let lobes: Vec<_> = (0..lobe_count).map(|_| lobe(&mut bytes, what & WILD_LOBES != 0)).collect();
     let wild = what & WILD_QUERY != 0;
     let position = bytes.vector(wild);
-    let constant = if wild { bytes.number(true) } else { bytes.scale() };
+    let constant = if wild { bytes.real(true) } else { bytes.scale() };
     let key = u64::from_le_bytes(bytes.take());
     let seed = bytes.byte();
 
@@ -109,7 +95,7 @@ pub fn check(bytes: &[u8]) -> usize {
 fn lobe(bytes: &mut Bytes<'_>, wild: bool) -> Lobe {
     if wild {
         let frame = Frame { x: bytes.vector(true), y: bytes.vector(true), z: bytes.vector(true) };
-        return Lobe::new(frame, bytes.number(true), bytes.number(true), bytes.number(true));
+        return Lobe::new(frame, bytes.real(true), bytes.real(true), bytes.real(true));
     }
     let frame = Frame::from_z_tangent(bytes.vector(false).normalize_or(DVec3::Z), bytes.vector(false));
     let (kind, ax, ay, c) = (bytes.byte(), bytes.scale(), bytes.scale(), bytes.scale());
