@@ -3,10 +3,14 @@
 //!
 //! `cargo bench --bench integrators -- caustic [scene] [seconds] [light subpaths] [samples]`
 //! `cargo bench --bench integrators -- rays`
+//! `cargo bench --bench integrators -- recipes [seconds] [runs] [scene]`: `auto` against fixed recipes
+//! `cargo bench --bench integrators -- auto [pairs]`: `auto` against `pt` where all is diffuse
 
 #[cfg(feature = "embree")]
 #[path = "support/bare_embree.rs"]
 mod bare_embree;
+#[path = "support/recipes.rs"]
+mod recipes;
 #[path = "support/workload.rs"]
 #[expect(dead_code, reason = "only its clock is wanted")]
 mod workload;
@@ -33,6 +37,41 @@ fn main() {
     if run("rays") {
         rays();
     }
+    if run("recipes") {
+        recipes::recipes(args.get(3).map(String::as_str), number(1, 4.0), number(2, 4.0) as u64);
+    }
+    if run("auto") {
+        auto_where_all_is_diffuse(number(1, 15.0) as usize);
+    }
+}
+
+/// Whole renders of `cornell` with a diffuse block, one thread: what the analysis and the choice cost.
+fn auto_where_all_is_diffuse(pairs: usize) {
+    let mut scene = load("cornell");
+    for material in scene.materials.iter_mut().filter(|m| m.name == "metal") {
+        *material = hrr::material::Material::diffuse("metal", hrr::math::Spectrum::splat(0.7));
+    }
+    let seconds = |integrator: Integrator| {
+        let settings =
+            Settings { integrator, threads: 1, iterations: 8, time: None, ..scene.settings.clone() };
+        let outcome = hrr::render::render(&scene, &settings, &hrr::render::Silent).expect("an image");
+        assert_eq!(outcome.stats.integrator, "pt");
+        // Of the thread that rendered: other programs on the machine do not count.
+        outcome.stats.seconds.eye_trace + outcome.stats.seconds.visibility + outcome.stats.seconds.film
+    };
+    let mut ratios: Vec<f64> = (0..pairs)
+        .map(|i| match i % 2 {
+            0 => seconds(Integrator::Auto) / seconds(Integrator::Pt),
+            _ => 1.0 / (seconds(Integrator::Pt) / seconds(Integrator::Auto)),
+        })
+        .collect();
+    ratios.sort_by(f64::total_cmp);
+    println!(
+        "diffuse cornell: time of auto over that of pt, {pairs} pairs in turns: median {:.4}, quartiles {:.4} and {:.4}",
+        ratios[pairs / 2],
+        ratios[pairs / 4],
+        ratios[3 * pairs / 4]
+    );
 }
 
 fn load(name: &str) -> Scene {

@@ -8,6 +8,7 @@ use crate::render::stop_on_interrupt;
 use crate::scene_args::{self, SceneArgs};
 use clap::builder::ValueHint;
 use clap::{Arg, ArgAction, ArgMatches, value_parser};
+use hrr::effects::Verdict;
 use hrr::image::{self, Attributes};
 use hrr::integrator::{Recipe, Size};
 use hrr::render::{Observer, Progress};
@@ -309,8 +310,20 @@ fn about(
             "reference",
             owner.map_or("given".into(), |i| format!("mean of all runs of {}", contenders[i].name)),
         ),
+        line("effects", effects(scene, settings)),
         line("settings", settings.to_toml().trim().replace('\n', "; ")),
     ]
+}
+
+/// What the scene calls for, and what the least machinery for it is.
+fn effects(scene: &Scene, settings: &Settings) -> String {
+    let effects = hrr::effects::analyze(scene, settings);
+    let present = effects.findings.iter().filter(|f| f.verdict != Verdict::Absent);
+    let mut words: Vec<_> = present.map(|f| format!("{} {}", f.id, f.verdict.name())).collect();
+    if let Ok(plan) = hrr::integrator::plan::plan(scene, settings, &effects) {
+        words.push(format!("plan: {}, {}", plan.integrator, plan.machinery.join(" ")));
+    }
+    words.join("; ")
 }
 
 fn rayon_threads(settings: &Settings) -> usize {
