@@ -48,14 +48,16 @@ fn counters_of_what_is_off_stay_0() {
         counts.map(|n| n > 0)
     };
     let glossy = with_cube(metal(1e-3, 1e-3));
+    // Enough for something to be accepted.
+    let many = |settings: Settings| Settings { samples: 32, expected: 100.0, ..settings };
     let under_lamp = |scene: Scene| lit(scene, lamp_without_size());
     let (yes, no) = (true, false);
     for (scene, settings, expected) in [
         (plain(), settings(), [no; 6]),
         (with_cube(mirror()), settings(), [yes, yes, no, no, no, no]),
-        (glossy.clone(), settings(), [yes, yes, yes, yes, yes, no]),
-        (under_lamp(with_cube(mirror())), settings(), [yes, yes, no, no, no, yes]),
-        (under_lamp(glossy), with("sds"), [yes; 6]),
+        (glossy.clone(), many(settings()), [yes, yes, yes, yes, yes, no]),
+        (under_lamp(with_cube(mirror())), many(settings()), [yes, yes, no, no, no, yes]),
+        (under_lamp(glossy), many(with("sds")), [yes; 6]),
     ] {
         assert_eq!(on(&scene, &settings), expected, "{:?}", planned(&scene, &settings));
     }
@@ -188,14 +190,18 @@ fn machinery_without_an_effect_changes_no_bit() {
 fn isotropic_lobes_are_the_same_as_ellipsoids_and_as_spheroids() {
     use hrr::roulette::{Lobe, Range};
     let frame = hrr::math::Frame::from_z(DVec3::new(0.2, 0.9, -0.3).normalize());
+    // Seen head on: a reflection seen askance is narrower one way than the other.
     let at = |alpha_x: f64, range: Range| {
-        let lobe =
-            Lobe::from_ggx_reflection(&frame, DVec3::new(0.5, 0.8, 0.1).normalize(), alpha_x, 1e-2, 1.0);
+        let lobe = Lobe::from_ggx_reflection(&frame, frame.z, alpha_x, 1e-2, 1.0);
         let lobe = lobe.with_range(range);
-        [DVec3::new(0.4, 0.5, -1.0), DVec3::X, -DVec3::Y].map(|offset| lobe.h2(offset).to_bits())
+        [DVec3::new(0.4, 0.5, -1.0), DVec3::X, -DVec3::Y].map(|offset| lobe.h2(offset))
     };
-    assert_eq!(at(1e-2, Range::Ellipsoid), at(1e-2, Range::Spheroid));
-    assert_ne!(at(1e-3, Range::Ellipsoid), at(1e-3, Range::Spheroid));
+    let differ = |alpha_x: f64| {
+        let pairs = at(alpha_x, Range::Ellipsoid).into_iter().zip(at(alpha_x, Range::Spheroid));
+        pairs.map(|(a, b)| (a / b - 1.0).abs()).fold(0.0, f64::max)
+    };
+    // But for rounding.
+    assert!(differ(1e-2) < 1e-12 && differ(1e-3) > 0.1, "{} {}", differ(1e-2), differ(1e-3));
 }
 
 /// Mean luminance of each tile of 4 x 4 pixels, over independent runs.
