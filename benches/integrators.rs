@@ -4,6 +4,8 @@
 //! `cargo bench --bench integrators -- caustic [scene] [seconds] [light subpaths] [samples]`
 //! `cargo bench --bench integrators -- rays`
 //! `cargo bench --bench integrators -- emitters [rounds]`
+//! `cargo bench --bench integrators -- recipes [seconds] [runs] [scene]`: `auto` against fixed recipes
+//! `cargo bench --bench integrators -- auto [pairs]`: `auto` against `pt` where all is diffuse
 
 #[cfg(feature = "embree")]
 #[path = "support/bare_embree.rs"]
@@ -13,6 +15,8 @@ mod emitters;
 #[path = "../tests/support/scenes.rs"]
 #[expect(dead_code, reason = "only one is wanted")]
 mod scenes;
+#[path = "support/recipes.rs"]
+mod recipes;
 #[path = "support/workload.rs"]
 #[expect(dead_code, reason = "only its clock is wanted")]
 mod workload;
@@ -42,6 +46,52 @@ fn main() {
     if run("emitters") {
         emitters::emitters(number(1, 12.0) as u64);
     }
+    if run("recipes") {
+        recipes::recipes(args.get(3).map(String::as_str), number(1, 4.0), number(2, 4.0) as u64);
+    }
+    if run("auto") {
+        auto_where_all_is_diffuse(number(1, 15.0) as usize);
+    }
+}
+
+/// Processor seconds of all threads, ended ones too, so that other programs on the machine do not count.
+fn process_seconds() -> f64 {
+    #[cfg(unix)]
+    {
+        let now = rustix::time::clock_gettime(rustix::time::ClockId::ProcessCPUTime);
+        now.tv_sec as f64 + now.tv_nsec as f64 * 1e-9
+    }
+    #[cfg(not(unix))]
+    cpu_seconds()
+}
+
+/// Whole renders of `cornell` with a diffuse block, one thread: what the analysis and the choice cost.
+fn auto_where_all_is_diffuse(pairs: usize) {
+    let mut scene = load("cornell");
+    for material in scene.materials.iter_mut().filter(|m| m.name == "metal") {
+        *material = hrr::material::Material::diffuse("metal", hrr::math::Spectrum::splat(0.7));
+    }
+    let seconds = |integrator: Integrator| {
+        let settings =
+            Settings { integrator, threads: 1, iterations: 8, time: None, ..scene.settings.clone() };
+        let start = process_seconds();
+        let outcome = hrr::render::render(&scene, &settings, &hrr::render::Silent).expect("an image");
+        assert_eq!(outcome.stats.integrator, "pt");
+        process_seconds() - start
+    };
+    let mut ratios: Vec<f64> = (0..pairs)
+        .map(|i| match i % 2 {
+            0 => seconds(Integrator::Auto) / seconds(Integrator::Pt),
+            _ => 1.0 / (seconds(Integrator::Pt) / seconds(Integrator::Auto)),
+        })
+        .collect();
+    ratios.sort_by(f64::total_cmp);
+    println!(
+        "diffuse cornell: time of auto over that of pt, {pairs} pairs in turns: median {:.4}, quartiles {:.4} and {:.4}",
+        ratios[pairs / 2],
+        ratios[pairs / 4],
+        ratios[3 * pairs / 4]
+    );
 }
 
 fn load(name: &str) -> Scene {

@@ -1,6 +1,7 @@
 //! Materials: what the surface of a triangle scatters and emits.
 
 use crate::bsdf::{Bsdf, Coated, Conductor, Dielectric, Lambert, Mirror, Reflectance};
+use crate::error::Place;
 use crate::geometry::Shading;
 use crate::math::{Frame, Spectrum};
 use crate::texture::Texture;
@@ -27,6 +28,19 @@ pub struct Material {
     pub two_sided_emission: bool,
     /// How likely the surface is there at all, 0..=1: what is not stopped goes on straight. A map is multiplied by it.
     pub opacity: f64,
+    /// What its file asks for and hrr has not got.
+    pub unsupported: Vec<Unsupported>,
+}
+
+/// Something that a material's file asks for and that hrr has not got.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Unsupported {
+    /// The MTL key that asks for it.
+    pub key: &'static str,
+    /// What it is, and what is done instead.
+    pub what: String,
+    /// Where.
+    pub place: Place,
 }
 
 /// What varies over a material's surfaces, beside the diffuse reflectance: data, but for `emission`.
@@ -109,6 +123,7 @@ impl Material {
             emission: Spectrum::ZERO,
             two_sided_emission: false,
             opacity: 1.0,
+            unsupported: Vec::new(),
         };
         material.set_maps(Maps::default());
         material

@@ -12,13 +12,19 @@ pub struct Texture {
     image: Arc<Image>,
     scale: DVec2,
     offset: DVec2,
+    /// Least and greatest pixel, channel by channel.
+    bounds: (Spectrum, Spectrum),
+    even: bool,
 }
 
 impl Texture {
     /// The texture coordinates (u, v) look up the image at (u, v) * `scale` + `offset`. The image must have pixels.
     pub fn new(image: Arc<Image>, scale: DVec2, offset: DVec2) -> Self {
         debug_assert!(image.width > 0 && image.height > 0);
-        Self { image, scale, offset }
+        let mut pixels = image.pixels.iter().map(|p| p.as_dvec3());
+        let first = pixels.next().unwrap_or_default();
+        let bounds = pixels.fold((first, first), |(low, high), p| (low.min(p), high.max(p)));
+        Self { image, scale, offset, bounds, even: bounds.0 == bounds.1 }
     }
 
     /// The value at texture coordinates, in the image's linear units.
@@ -40,6 +46,10 @@ impl Texture {
     }
 
     fn between(&self, x: Axis, y: Axis) -> Spectrum {
+        if self.even {
+            // To the bit, which interpolation would not give.
+            return self.bounds.0;
+        }
         let w = self.image.width as usize;
         let at = |column: usize, row: usize| self.image.pixels[row * w + column].as_dvec3();
         let above = at(x.first, y.first).lerp(at(x.second, y.first), x.weight);
@@ -49,15 +59,12 @@ impl Texture {
 
     /// The value, where it is the same over the whole plane.
     pub fn constant(&self) -> Option<Spectrum> {
-        let (low, high) = self.bounds();
-        (low == high).then_some(low)
+        self.even.then_some(self.bounds.0)
     }
 
     /// Least and greatest value of each channel over the whole plane.
     pub fn bounds(&self) -> (Spectrum, Spectrum) {
-        let mut pixels = self.image.pixels.iter().map(|p| p.as_dvec3());
-        let first = pixels.next().unwrap_or_default();
-        pixels.fold((first, first), |(low, high), p| (low.min(p), high.max(p)))
+        self.bounds
     }
 }
 
@@ -129,6 +136,22 @@ mod tests {
         let uv = DVec2::new(0.3, 0.8);
         let there = DVec2::new(0.3 * 2.0 + 0.1, 0.8 * 3.0 - 0.2);
         assert!((t.lookup(uv) - plain.lookup(there)).length() < 1e-12);
+    }
+
+    #[test]
+    fn an_even_image_is_its_value_to_the_bit() {
+        let pixels = vec![Vec3::new(0.1, 0.7, 1e-3); 6];
+        let t = Texture::new(
+            Arc::new(Image { width: 3, height: 2, pixels }),
+            DVec2::new(1.3, 0.7),
+            DVec2::splat(0.11),
+        );
+        assert_eq!(t.constant(), Some(t.bounds().0));
+        for i in 0..200 {
+            let uv = DVec2::new(f64::from(i) * 0.0173, f64::from(i) * -0.0291);
+            assert_eq!((t.lookup(uv), t.lookup_clamped(uv)), (t.bounds().0, t.bounds().0), "{uv}");
+        }
+        assert_eq!(checks(DVec2::ONE, DVec2::ZERO).constant(), None);
     }
 
     #[test]

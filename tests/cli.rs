@@ -200,7 +200,8 @@ fn statistics_on_stdout_have_the_contracts_names_and_no_others() {
     };
     assert_eq!(
         names(&stats),
-        "counters effects height integrator iterations memory scene seconds seed threads version visibility width"
+        "biased counters effects height integrator iterations machinery memory scene seconds seed threads version \
+         visibility width"
     );
     assert_eq!(
         names(&stats["seconds"]),

@@ -1,6 +1,10 @@
 //! What scenes call for: each effect in a scene that has it and in one that has not, what is switched on for it, and that
 //! what is off does nothing.
 
+mod coverage;
+mod images;
+mod predicates;
+
 use crate::support::scenes::{cube, in_memory, quad};
 use glam::{DVec2, DVec3, Vec3};
 use hrr::effects::{Effect, Verdict, analyze};
@@ -10,7 +14,6 @@ use hrr::integrator::plan::{Plan, plan};
 use hrr::light::LightSource;
 use hrr::material::{Maps, Material, Scattering};
 use hrr::math::Spectrum;
-use hrr::render::{Outcome, Silent, render};
 use hrr::scene::Scene;
 use hrr::settings::{Backend, Integrator, Settings};
 use hrr::texture::Texture;
@@ -74,10 +77,6 @@ fn settings() -> Settings {
 
 fn planned(scene: &Scene, settings: &Settings) -> hrr::Result<Plan> {
     plan(scene, settings, &analyze(scene, settings))
-}
-
-fn rendered(scene: &Scene, settings: &Settings) -> Outcome {
-    render(scene, settings, &Silent).unwrap()
 }
 
 /// Every row: a scene that has the effect, and what that switches on. The plain scene has but the first two.
@@ -180,85 +179,4 @@ fn the_plan_is_the_least_that_finds_the_light() {
     assert_eq!(planned(&plain(), &asked("sds")).unwrap().integrator, Integrator::Vcm);
     assert_eq!(planned(&plain(), &asked("sdg")).unwrap().integrator, Integrator::LvcHrr);
     assert_eq!(planned(&plain(), &asked("caustics")).unwrap().integrator, Integrator::Lvc);
-}
-
-#[test]
-fn paths_that_nothing_finds_are_an_error_that_names_them() {
-    let scene = lit(with_cube(mirror()), lamp_without_size());
-    for (integrator, path) in [
-        (Integrator::Pt, "paths L S D E (from a light without size): pt"),
-        (Integrator::Lvc, "paths L S D S E (from a light without size): lvc"),
-        (Integrator::Lt, "paths L S E: lt"),
-    ] {
-        let named = Settings { integrator, ..settings() };
-        let error = planned(&scene, &named).unwrap_err();
-        assert!(error.to_string().contains(path) && error.exit_code() == 5, "{error}");
-    }
-    let without = |list: &str| Settings { without: list.parse().unwrap(), ..settings() };
-    let plan = planned(&scene, &Settings { integrator: Integrator::Lvc, ..without("sds") }).unwrap();
-    assert!(plan.is_biased() && plan.complaint().unwrap().contains("L S D S E"), "{plan:?}");
-    // Light tracing without all that is smooth.
-    let plan = planned(&scene, &Settings { integrator: Integrator::Lt, ..without("specular") }).unwrap();
-    assert!(plan.is_biased() && plan.complaint().unwrap().contains("L D S E"), "{plan:?}");
-    // Auto does without what it is told to.
-    let plan = planned(&scene, &without("sds")).unwrap();
-    assert_eq!((plan.integrator, plan.is_biased()), (Integrator::Lvc, true));
-    let plan = planned(&scene, &without("light_subpaths")).unwrap();
-    assert_eq!((plan.integrator, plan.is_biased()), (Integrator::Pt, true));
-    // What is not there can be left out.
-    assert!(!planned(&plain(), &without("sds,lens")).unwrap().is_biased());
-    let error = render(&scene, &without("refraction"), &Silent).unwrap_err();
-    assert!(error.to_string().contains("refraction cannot be left out"), "{error}");
-}
-
-#[test]
-fn counters_of_what_is_off_stay_0() {
-    let counters = |scene: &Scene| rendered(scene, &settings()).stats.counters;
-    let c = counters(&plain());
-    assert_eq!((c.light_subpaths, c.light_vertices, c.queries, c.nodes_visited, c.accepted), (0, 0, 0, 0, 0));
-    assert!(c.camera_rays > 0 && c.connection_rays > 0);
-    let c = counters(&with_cube(mirror()));
-    assert!(c.light_subpaths > 0 && (c.queries, c.nodes_visited) == (0, 0), "{c:?}");
-    let c = counters(&with_cube(metal(1e-3, 1e-3)));
-    assert!(c.light_subpaths > 0 && c.queries > 0, "{c:?}");
-}
-
-/// Pixels, to the bit.
-fn bits(scene: &Scene, settings: &Settings) -> Vec<[u32; 3]> {
-    let image = rendered(scene, settings).film.image();
-    image.pixels.iter().map(|p| p.to_array().map(f32::to_bits)).collect()
-}
-
-#[test]
-fn what_is_absent_is_off_to_the_bit() {
-    let glossy = || with_cube(metal(1e-2, 1e-2));
-    for scene in [plain(), glossy()] {
-        let auto = bits(&scene, &settings());
-        assert!(auto.iter().any(|p| *p != [0; 3]));
-        for effect in Effect::ALL {
-            let (found, cannot) =
-                (analyze(&scene, &settings()), ["refraction", "textures", "anisotropy", "specular"]);
-            if found.of(effect).verdict == Verdict::Absent && !cannot.contains(&effect.id()) {
-                let without = Settings { without: [effect].into_iter().collect(), ..settings() };
-                assert_eq!(bits(&scene, &without), auto, "{effect}");
-            }
-        }
-    }
-    // An even texture is its value.
-    let even = |albedo: f64, map| with_cube(Scattering::Diffuse { albedo: Spectrum::splat(albedo), map });
-    assert_eq!(bits(&even(1.0, texture([0.25, 0.25])), &settings()), bits(&even(0.25, None), &settings()));
-    let bright = |emission: f64, map| {
-        let mut scene = mapped(Maps { emission: map, ..Maps::default() });
-        scene.materials[0].emission = Spectrum::splat(emission);
-        scene
-    };
-    assert_eq!(bits(&bright(4.0, texture([0.5, 0.5])), &settings()), bits(&bright(2.0, None), &settings()));
-    let open = mapped(Maps { opacity: texture([1.0, 1.0]), ..Maps::default() });
-    assert_eq!(bits(&open, &settings()), bits(&plain(), &settings()));
-    // With what is there, the image changes: the comparison can fail.
-    let mut lens = plain();
-    lens.camera.aperture_radius = 0.1;
-    assert_ne!(bits(&lens, &settings()), bits(&plain(), &settings()));
-    let without = Settings { without: "lens".parse().unwrap(), ..settings() };
-    assert_eq!(bits(&lens, &without), bits(&plain(), &settings()));
 }

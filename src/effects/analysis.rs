@@ -1,16 +1,15 @@
 //! From a scene to verdicts.
 
+use super::convexity::is_convex_from_outside;
 use super::paths::Vertex::{self, D, G, S};
+use super::predicate::{Judge, Predicate};
 use super::{Effect, Effects, Finding, Lobes, PathClass, Verdict, Witness};
-use crate::geometry::Mesh;
 use crate::light::LightSource;
 use crate::material::Material;
 use crate::math::{Spectrum, luminance};
 use crate::scene::Scene;
 use crate::settings::Settings;
 use crate::texture::Texture;
-use glam::DVec3;
-use std::collections::HashMap;
 
 /// A material that triangles use.
 struct Used<'a> {
@@ -22,6 +21,7 @@ struct Used<'a> {
 /// What all verdicts look at.
 struct Facts<'a> {
     scene: &'a Scene,
+    judge: Judge,
     used: Vec<Used<'a>>,
     max_depth: u32,
     /// Lights with size: emitting surfaces and an environment.
@@ -32,14 +32,21 @@ struct Facts<'a> {
 
 /// Analyses a scene as it would be rendered with these settings.
 pub fn analyze(scene: &Scene, settings: &Settings) -> Effects {
-    let facts = Facts::new(scene, settings);
+    analyze_as(scene, settings, Judge::default())
+}
+
+/// As [`analyze`], by a judge who may be wrong about a predicate; for tests of the tests.
+#[doc(hidden)]
+pub fn analyze_as(scene: &Scene, settings: &Settings, judge: Judge) -> Effects {
+    let facts = Facts::new(scene, settings, judge);
     let classes = facts.classes();
-    let findings = Effect::ALL.map(|effect| facts.finding(effect, &classes)).to_vec();
+    let mut findings = Effect::ALL.map(|effect| facts.finding(effect, &classes)).to_vec();
+    findings.extend(facts.unsupported());
     Effects { findings, classes }
 }
 
 impl<'a> Facts<'a> {
-    fn new(scene: &'a Scene, settings: &Settings) -> Self {
+    fn new(scene: &'a Scene, settings: &Settings, judge: Judge) -> Self {
         let mut first = vec![None; scene.materials.len()];
         for (triangle, &m) in (0u32..).zip(&scene.mesh.materials) {
             first[m as usize].get_or_insert(triangle);
@@ -48,19 +55,40 @@ impl<'a> Facts<'a> {
             .materials
             .iter()
             .zip(first)
-            .filter_map(|(material, first)| {
-                Some(Used { material, lobes: Lobes::of(material, settings.hrr_alpha), first: first? })
+            .filter(|(_, first)| judge.holds(Predicate::Used, first.is_some()))
+            .map(|(material, first)| Used {
+                material,
+                lobes: Lobes::judged(material, settings.hrr_alpha, judge),
+                first: first.unwrap_or(0),
             })
             .collect();
-        let gives = |light: &Spectrum| luminance(*light) > 0.0;
+        let gives = |light: &Spectrum| judge.holds(Predicate::LampGives, luminance(*light) > 0.0);
         let delta = |light: &LightSource| match light {
             LightSource::Point { intensity, .. } | LightSource::Spot { intensity, .. } => gives(intensity),
             LightSource::Directional { irradiance, .. } => gives(irradiance),
             LightSource::Environment { .. } => false,
         };
-        let lights = used.iter().any(|u| u.material.emits()) || environment(scene);
         let delta_lights = scene.lights.iter().any(delta);
-        Self { scene, used, max_depth: settings.max_depth, lights, delta_lights }
+        let mut facts =
+            Self { scene, judge, used, max_depth: settings.max_depth, lights: false, delta_lights };
+        facts.lights = facts.used.iter().any(|u| facts.emits(u)) || facts.sky();
+        facts
+    }
+
+    fn emits(&self, u: &Used<'_>) -> bool {
+        self.judge.holds(Predicate::Emits, u.material.emits())
+    }
+
+    fn two_sided(&self, u: &Used<'_>) -> bool {
+        self.emits(u) && self.judge.holds(Predicate::TwoSided, u.material.two_sided_emission)
+    }
+
+    fn opaque(&self, u: &Used<'_>) -> bool {
+        self.judge.holds(Predicate::Opaque, u.material.is_opaque())
+    }
+
+    fn sky(&self) -> bool {
+        self.judge.holds(Predicate::Sky, environment(self.scene))
     }
 
     fn lit(&self) -> bool {
@@ -102,9 +130,11 @@ impl<'a> Facts<'a> {
         for (delta_light, there) in [(false, self.lights), (true, self.delta_lights)] {
             for (surfaces, effect) in candidates {
                 // What is smooth shows no light without size: those paths carry nothing.
-                let seen = !delta_light || surfaces.iter().any(|v| *v != S);
+                let open = surfaces.iter().any(|v| *v != S);
+                let seen = !delta_light || self.judge.holds(Predicate::LampSeen, open);
                 let possible = surfaces.len() == 1 || mutual;
-                let short = (surfaces.len() as u32) < self.max_depth;
+                let short =
+                    self.judge.holds(Predicate::ShortEnough, (surfaces.len() as u32) < self.max_depth);
                 if there && seen && possible && short && surfaces.iter().all(exists) {
                     classes.push(PathClass { delta_light, surfaces: surfaces.to_vec(), effect });
                 }
@@ -121,8 +151,8 @@ impl<'a> Facts<'a> {
                 eyes.push(*position);
             }
         }
-        let opaque = !self.any(|l| l.transmits) && self.used.iter().all(|u| u.material.is_opaque());
-        !(opaque && is_convex_from_outside(&self.scene.mesh, &eyes))
+        let opaque = !self.any(|l| l.transmits) && self.used.iter().all(|u| self.opaque(u));
+        !(opaque && is_convex_from_outside(&self.scene.mesh, &eyes, self.judge))
     }
 
     fn finding(&self, effect: Effect, classes: &[PathClass]) -> Finding {
@@ -174,7 +204,7 @@ impl<'a> Facts<'a> {
             }
             Effect::Sds => {
                 let all: Vec<_> = classes.iter().filter(|c| c.effect == effect).collect();
-                match all.iter().any(|c| c.delta_light) {
+                match all.iter().any(|c| self.only_merging(c)) {
                     true => (
                         Verdict::Wanted,
                         format!("only merging finds {}", all.last().map_or(String::new(), |c| c.to_string())),
@@ -189,19 +219,21 @@ impl<'a> Facts<'a> {
             Effect::Specular => (of(self.any(|l| l.specular)), "smooth lobes".into()),
             Effect::Refraction => (of(self.any(|l| l.transmits)), "light passes through surfaces".into()),
             Effect::Opacity => (
-                of(self.used.iter().any(|u| !u.material.is_opaque())),
+                of(self.used.iter().any(|u| !self.opaque(u))),
                 "surfaces that are not everywhere there".into(),
             ),
             Effect::Textures | Effect::NormalMaps | Effect::EmissionTextures => self.maps(effect),
             Effect::Anisotropy => (of(self.any(|l| l.anisotropic)), "roughness differs by direction".into()),
-            Effect::Environment => (of(environment(self.scene)), "an environment light".into()),
+            Effect::Environment => (of(self.sky()), "an environment light".into()),
             Effect::Lens => {
                 let radius = self.scene.camera.aperture_radius;
-                (of(radius > 0.0), format!("camera.aperture_radius is {radius}"))
+                (
+                    of(self.judge.holds(Predicate::Aperture, radius > 0.0)),
+                    format!("camera.aperture_radius is {radius}"),
+                )
             }
             Effect::TwoSidedEmission => {
-                let two_sided = |u: &Used<'_>| u.material.emits() && u.material.two_sided_emission;
-                (of(self.used.iter().any(two_sided)), "back faces emit".into())
+                (of(self.used.iter().any(|u| self.two_sided(u))), "back faces emit".into())
             }
         };
         let plain_absent = |why: String| match effect {
@@ -212,7 +244,7 @@ impl<'a> Facts<'a> {
             _ => why,
         };
         Finding {
-            effect,
+            id: effect.id().to_owned(),
             verdict,
             why: plain_absent(why),
             materials: if verdict == Verdict::Absent { Vec::new() } else { self.witnesses(effect) },
@@ -222,18 +254,26 @@ impl<'a> Facts<'a> {
 
     fn reads_light_subpaths(&self, classes: &[PathClass]) -> bool {
         let reads = |c: &PathClass| {
-            matches!(c.effect, Effect::Caustics | Effect::Sdg) || c.effect == Effect::Sds && c.delta_light
+            matches!(c.effect, Effect::Caustics | Effect::Sdg)
+                || c.effect == Effect::Sds && self.only_merging(c)
         };
         classes.iter().any(reads)
     }
 
+    /// Whether nothing but merging finds caustics that smooth surfaces show: no eye subpath meets a light without size.
+    fn only_merging(&self, sds: &PathClass) -> bool {
+        self.judge.holds(Predicate::OnlyMerging, sds.delta_light)
+    }
+
     fn maps(&self, effect: Effect) -> (Verdict, String) {
         let maps: Vec<&Texture> = self.used.iter().flat_map(|u| maps_of(u.material, effect)).collect();
-        let varying = maps.iter().any(|map| map.constant().is_none());
+        let varies = |map: &&Texture| self.judge.holds(Predicate::Varies, map.constant().is_none());
+        let varying = maps.iter().any(varies);
+        let bends = self.judge.holds(Predicate::EvenNormals, effect == Effect::NormalMaps);
         match (varying, maps.is_empty()) {
             (true, _) => (Verdict::Wanted, "maps that vary".into()),
             // An even normal map may still bend normals; an even picture is its value, to the bit.
-            (false, false) if effect == Effect::NormalMaps => (Verdict::Wanted, "a normal map".into()),
+            (false, false) if bends => (Verdict::Wanted, "a normal map".into()),
             (false, false) => {
                 (Verdict::Absent, "every map is the same everywhere: it counts as its value".into())
             }
@@ -244,18 +284,18 @@ impl<'a> Facts<'a> {
     /// The materials that an effect rests on.
     fn witnesses(&self, effect: Effect) -> Vec<Witness> {
         let counts = |u: &&Used<'_>| match effect {
-            Effect::Direct => u.material.emits() || u.lobes.receives(),
+            Effect::Direct => self.emits(u) || u.lobes.receives(),
             Effect::Interreflection => u.lobes.any(),
             Effect::LightSubpaths | Effect::Caustics => u.lobes.throws(),
             Effect::Sdg => u.lobes.open,
             Effect::Sds | Effect::Specular => u.lobes.specular,
             Effect::Refraction => u.lobes.transmits,
-            Effect::Opacity => !u.material.is_opaque(),
+            Effect::Opacity => !self.opaque(u),
             Effect::Textures | Effect::NormalMaps | Effect::EmissionTextures => {
                 !maps_of(u.material, effect).is_empty()
             }
             Effect::Anisotropy => u.lobes.anisotropic,
-            Effect::TwoSidedEmission => u.material.emits() && u.material.two_sided_emission,
+            Effect::TwoSidedEmission => self.two_sided(u),
             Effect::Environment | Effect::Lens => false,
         };
         let witness = |u: &Used<'_>| Witness {
@@ -264,6 +304,31 @@ impl<'a> Facts<'a> {
             evidence: evidence(u, effect),
         };
         self.used.iter().filter(counts).map(witness).collect()
+    }
+
+    /// What materials ask for and hrr has not got, in the order of materials and their lines.
+    fn unsupported(&self) -> Vec<Finding> {
+        let mut findings: Vec<Finding> = Vec::new();
+        for u in &self.used {
+            for lack in &u.material.unsupported {
+                let witness = Witness {
+                    material: u.material.name.clone(),
+                    triangle: u.first,
+                    evidence: lack.place.to_string(),
+                };
+                match findings.iter_mut().find(|f| f.id == lack.key) {
+                    Some(known) => known.materials.push(witness),
+                    None => findings.push(Finding {
+                        id: lack.key.to_owned(),
+                        verdict: Verdict::Unsupported,
+                        why: lack.what.clone(),
+                        materials: vec![witness],
+                        machinery: &[],
+                    }),
+                }
+            }
+        }
+        findings
     }
 }
 
@@ -328,42 +393,4 @@ fn machinery(effect: Effect) -> &'static [&'static str] {
         Effect::Lens => &["lens_sampling"],
         Effect::TwoSidedEmission => &["two_sided_emission"],
     }
-}
-
-/// Most triangles of a mesh that is tried for being convex.
-const MOST_TRIANGLES: usize = 1024;
-
-/// Whether no two points of a mesh see each other on the side on which the camera and lamps (`eyes`, world coordinates)
-/// are: it is flat, or closed and convex, and they are outside.
-fn is_convex_from_outside(mesh: &Mesh, eyes: &[DVec3]) -> bool {
-    let count = mesh.triangles.len();
-    if count == 0 || count > MOST_TRIANGLES {
-        return false;
-    }
-    let size = mesh.bounds().radius();
-    let corners: Vec<DVec3> =
-        mesh.triangles.iter().flatten().map(|&v| mesh.positions[v as usize].as_dvec3()).collect();
-    let planes: Vec<(DVec3, f64)> = (0..count as u32)
-        .map(|t| {
-            let n = mesh.scaled_normal(t).normalize_or_zero();
-            (n, n.dot(mesh.corners(t)[0]))
-        })
-        .collect();
-    let tolerance = 1e-5 * size;
-    let flat = planes.iter().all(|(n, d)| corners.iter().all(|p| (n.dot(*p) - d).abs() <= tolerance));
-    if flat {
-        return true;
-    }
-    let behind = planes.iter().all(|(n, d)| corners.iter().all(|p| n.dot(*p) - d <= tolerance));
-    // Closed: each edge is there once in either direction. Corners are the same where their positions are.
-    let mut edges: HashMap<[[u32; 3]; 2], i32> = HashMap::new();
-    for t in &mesh.triangles {
-        let p = t.map(|v| mesh.positions[v as usize].to_array().map(|x| (x + 0.0).to_bits()));
-        for [a, b] in [[p[0], p[1]], [p[1], p[2]], [p[2], p[0]]] {
-            *edges.entry(if a < b { [a, b] } else { [b, a] }).or_default() += if a < b { 1 } else { -1 };
-        }
-    }
-    let closed = edges.values().all(|&n| n == 0);
-    let outside = eyes.iter().all(|eye| planes.iter().any(|(n, d)| n.dot(*eye - mesh.origin) > *d));
-    behind && closed && outside
 }

@@ -1,5 +1,6 @@
 //! The lobes of a material, with the bounds of its textures.
 
+use super::predicate::{Judge, Predicate};
 use crate::bsdf::ggx::MIN_ALPHA;
 use crate::material::{Material, Scattering};
 use crate::math::Spectrum;
@@ -32,35 +33,36 @@ pub struct Lobes {
 impl Lobes {
     /// The lobes of a material; `widest`: roughness beyond which a lobe counts as diffuse.
     pub fn of(material: &Material, widest: f64) -> Self {
-        let black = |c: Spectrum| c.max_element() <= 0.0;
+        Self::judged(material, widest, Judge::default())
+    }
+
+    /// As [`Lobes::of`], by a judge of predicates.
+    pub(super) fn judged(material: &Material, widest: f64, judge: Judge) -> Self {
+        let reflects = |c: Spectrum| judge.holds(Predicate::Reflects, c.max_element() > 0.0);
+        let narrow = |lobes: &mut Self, alpha: [f64; 2], reflects: bool| {
+            if reflects {
+                lobes.narrow(alpha, &material.maps().roughness, widest, judge);
+            }
+        };
         let mut lobes = Self::default();
         match material.scattering() {
-            Scattering::Diffuse { albedo, map } => lobes.diffuse = !black(*albedo * greatest(map)),
-            Scattering::Mirror { reflectance } => lobes.narrow([0.0; 2], &None, widest, !black(*reflectance)),
+            Scattering::Diffuse { albedo, map } => lobes.diffuse = reflects(*albedo * greatest(map)),
+            Scattering::Mirror { reflectance } => narrow(&mut lobes, [0.0; 2], reflects(*reflectance)),
             Scattering::Conductor { reflectance, alpha_x, alpha_y } => {
-                lobes.narrow(
-                    [*alpha_x, *alpha_y],
-                    &material.maps().roughness,
-                    widest,
-                    !black(reflectance.mean()),
-                );
+                narrow(&mut lobes, [*alpha_x, *alpha_y], reflects(reflectance.mean()));
             }
-            Scattering::Dielectric { alpha_x, alpha_y, .. } => {
-                lobes.narrow([*alpha_x, *alpha_y], &material.maps().roughness, widest, true);
-                lobes.transmits = true;
-            }
+            Scattering::Dielectric { alpha_x, alpha_y, .. } => narrow(&mut lobes, [*alpha_x, *alpha_y], true),
             Scattering::Coated { albedo, map, alpha_x, alpha_y, .. } => {
-                lobes.narrow([*alpha_x, *alpha_y], &material.maps().roughness, widest, true);
-                lobes.diffuse |= !black(*albedo * greatest(map));
+                narrow(&mut lobes, [*alpha_x, *alpha_y], true);
+                lobes.diffuse |= reflects(*albedo * greatest(map));
             }
         }
+        let glass = matches!(material.scattering(), Scattering::Dielectric { .. });
+        lobes.transmits = judge.holds(Predicate::Transmits, glass);
         lobes
     }
 
-    fn narrow(&mut self, alpha: [f64; 2], map: &Option<Texture>, widest: f64, reflects: bool) {
-        if !reflects {
-            return;
-        }
+    fn narrow(&mut self, alpha: [f64; 2], map: &Option<Texture>, widest: f64, judge: Judge) {
         // Interpolated pixels take all values between the least and the greatest.
         let (low, high) = map.as_ref().map_or((1.0, 1.0), |map| {
             let (low, high) = map.bounds();
@@ -68,13 +70,15 @@ impl Lobes {
         });
         let greater = alpha[0].max(alpha[1]);
         let (least, most) = (low * greater, high * greater);
+        let narrow = judge.holds(Predicate::Narrow, least <= widest);
+        let open = judge.holds(Predicate::Open, most >= MIN_ALPHA);
         self.alpha = Some((least, most));
-        self.delta = least < MIN_ALPHA;
-        self.specular = least <= SMOOTH;
-        self.glossy = most > SMOOTH && least <= widest;
-        self.open = most >= MIN_ALPHA && least <= widest;
-        self.diffuse = most > widest;
-        self.anisotropic = alpha[0] != alpha[1] && most >= MIN_ALPHA;
+        self.delta = judge.holds(Predicate::Delta, least < MIN_ALPHA);
+        self.specular = judge.holds(Predicate::Smooth, least <= SMOOTH);
+        self.glossy = narrow && judge.holds(Predicate::Rough, most > SMOOTH);
+        self.open = narrow && open;
+        self.diffuse = judge.holds(Predicate::Broad, most > widest);
+        self.anisotropic = open && judge.holds(Predicate::Anisotropic, alpha[0] != alpha[1]);
     }
 
     /// Whether light goes on from it at all.

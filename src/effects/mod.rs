@@ -5,11 +5,13 @@
 //! change a pixel.
 
 mod analysis;
+mod convexity;
 mod material;
 pub mod paths;
+pub mod predicate;
 
 pub use crate::settings::{Effect, EffectSet};
-pub use analysis::analyze;
+pub use analysis::{analyze, analyze_as};
 pub use material::Lobes;
 pub use paths::PathClass;
 
@@ -39,8 +41,8 @@ impl Verdict {
 /// An effect and what the analysis found.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Finding {
-    /// The effect.
-    pub effect: Effect,
+    /// The name of an [`Effect`], or of what hrr has not got: the MTL key that asks for it.
+    pub id: String,
     /// The verdict.
     pub verdict: Verdict,
     /// Why, in half a sentence.
@@ -58,14 +60,14 @@ pub struct Witness {
     pub material: String,
     /// The first triangle that uses it.
     pub triangle: u32,
-    /// What makes it count: lobes and bounds of its textures.
+    /// What makes it count: lobes and bounds of its textures, or the line that asks for what hrr has not got.
     pub evidence: String,
 }
 
 /// All effects of a scene.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Effects {
-    /// In the order of [`Effect::ALL`].
+    /// In the order of [`Effect::ALL`], and then what is unsupported.
     pub findings: Vec<Finding>,
     /// The kinds of paths that bring light to the camera.
     pub classes: Vec<PathClass>,
@@ -75,6 +77,11 @@ impl Effects {
     /// What was found of an effect.
     pub fn of(&self, effect: Effect) -> &Finding {
         &self.findings[effect as usize]
+    }
+
+    /// What was found under a name; `None` where hrr has no such effect and the scene does not ask for it.
+    pub fn named(&self, id: &str) -> Option<&Finding> {
+        self.findings.iter().find(|f| f.id == id)
     }
 
     /// Whether an effect is wanted.

@@ -6,18 +6,18 @@ use super::recipe::{Base, Recipe};
 use super::records::Records;
 use super::spread::Adaptive;
 use super::{Integrator, Size};
+use crate::effects::Lobes;
 use crate::error::Result;
 use crate::film::Film;
 use crate::light_cache::LightCache;
-use crate::material::Material;
 use crate::roulette::{MinimumRandom, Pregenerated};
 use crate::sampler::{Purpose, Sampler, Stream};
+use crate::scene::Scene;
 use crate::settings::{Settings, Switch};
-use crate::subpath::{Origin, Storing, World};
+use crate::subpath::{Storing, World};
 use crate::tally::Tally;
 use crate::techniques::{Merging, Numerics, Roulette, Techniques};
 use crate::vertex_bvh::VertexBvh;
-use glam::DVec2;
 use std::f64::consts::PI;
 use std::time::Instant;
 
@@ -73,14 +73,11 @@ impl<'a> Bidirectional<'a> {
         Ok(machine)
     }
 
-    /// Whether no material has lobes for the roulette.
+    /// Whether no surface has lobes for the roulette, anywhere on it.
     fn nothing_glossy(&self) -> bool {
-        let rule = Storing { max_alpha: self.settings.hrr_alpha, ..Storing::ALL };
-        let glossy = |m: &Material| {
-            let bsdf = m.bsdf(DVec2::ZERO);
-            !bsdf.is_delta() && rule.origin(&bsdf) == Origin::Narrow
-        };
-        !self.world.scene.materials.iter().any(glossy)
+        let Scene { materials, mesh, .. } = self.world.scene;
+        let open: Vec<bool> = materials.iter().map(|m| Lobes::of(m, self.settings.hrr_alpha).open).collect();
+        !mesh.materials.iter().any(|&m| open[m as usize])
     }
 
     /// Makes the tree over the cache's vertices, and the numbers of the stream's iteration that its queries share.

@@ -2,7 +2,7 @@
 
 use super::recipe::{Base, Recipe};
 use crate::effects::paths::{Coverage, Vertex};
-use crate::effects::{Effect, EffectSet, Effects, PathClass, Verdict};
+use crate::effects::{Effect, EffectSet, Effects, PathClass};
 use crate::error::{Error, Place, Result};
 use crate::scene::Scene;
 use crate::settings::{Integrator, Settings};
@@ -83,13 +83,9 @@ pub fn plan(scene: &Scene, settings: &Settings, effects: &Effects) -> Result<Pla
         });
     }
     let mut machinery: BTreeSet<&'static str> = machinery(recipe.as_ref()).into_iter().collect();
-    for finding in &effects.findings {
-        if finding.effect >= Effect::Specular
-            && finding.verdict == Verdict::Wanted
-            && !settings.without.contains(finding.effect)
-        {
-            machinery.extend(finding.machinery);
-        }
+    let of_the_scene = Effect::ALL.into_iter().filter(|&effect| effect >= Effect::Specular);
+    for effect in of_the_scene.filter(|&e| effects.wants(e) && !settings.without.contains(e)) {
+        machinery.extend(effects.of(effect).machinery);
     }
     Ok(Plan { integrator, machinery: machinery.into_iter().collect(), dropped, uncovered })
 }

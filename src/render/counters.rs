@@ -27,6 +27,10 @@ pub struct Stats {
     pub iterations: u64,
     /// Effects of the scene and the verdict on each.
     pub effects: BTreeMap<String, String>,
+    /// Names of the machinery that ran.
+    pub machinery: Vec<String>,
+    /// Whether light is missing from the image, because an effect that the scene calls for was left out.
+    pub biased: bool,
     /// What took how long.
     pub seconds: Seconds,
     /// What was done how often.

@@ -146,11 +146,9 @@ fn run(scene: &Scene, settings: &Settings, observer: &dyn Observer) -> Result<Ou
         width: film.width(),
         height: film.height(),
         iterations: finished,
-        effects: effects
-            .findings
-            .iter()
-            .map(|f| (f.effect.id().to_owned(), f.verdict.name().to_owned()))
-            .collect(),
+        effects: effects.findings.iter().map(|f| (f.id.clone(), f.verdict.name().to_owned())).collect(),
+        machinery: plan.machinery.iter().map(|&name| name.to_owned()).collect(),
+        biased: plan.is_biased(),
         seconds: Seconds {
             load: 0.0,
             accel_build,

@@ -21,10 +21,10 @@ mod precision;
 pub use cull::{MAX_LOBES, query, query_brute_force};
 pub use lobe::{Lobe, Range};
 pub use min_random::{MinimumRandom, Pregenerated};
-pub use precision::{LobePrecision, probability_in};
 /// The node test, for trees of other widths to be measured with (`benches/support/widths`).
 #[doc(hidden)]
 pub use plane::{Box8, FlatLobe, PAD, Vec8};
+pub use precision::{LobePrecision, probability_in};
 
 use glam::DVec3;
 

@@ -69,6 +69,9 @@ const KEYS: [(&str, Kind); 44] = [
     ("map_aat", Kind::Ignored),
 ];
 
+/// The option of `d` that makes a surface fade towards its silhouette, for which there is no physical reading.
+const HALO: &str = "-halo";
+
 /// An MTL file.
 #[derive(Debug, Clone)]
 pub(super) struct Library {
@@ -103,6 +106,11 @@ impl MtlMaterial {
         let mut keys: Vec<_> = self.lines.keys().copied().filter(is_map).collect();
         keys.sort_by_key(|k| self.lines[k]);
         keys
+    }
+
+    /// Whether the surface is to fade towards its silhouette.
+    pub(super) fn has_halo(&self) -> bool {
+        self.lines.contains_key(HALO)
     }
 
     /// What follows a map key.
@@ -159,6 +167,9 @@ impl Library {
                 if kind == Kind::Map {
                     head.maps.insert(key, value.clone());
                 }
+                if key == "d" && rest.starts_with(HALO) {
+                    head.lines.insert(HALO, index + 1);
+                }
                 writeln!(plain, "{key} {value}").ok();
             }
         }
@@ -183,8 +194,7 @@ fn check(kind: Kind, key: &str, rest: &str) -> std::result::Result<String, Strin
         return Ok(rest.to_owned());
     }
     let words: Vec<&str> = rest.split_whitespace().take_while(|w| !w.starts_with('#')).collect();
-    // `d -halo 0.5` fades towards the silhouette, for which there is no physical reading.
-    let words = if key == "d" && words.first() == Some(&"-halo") { &words[1..] } else { &words[..] };
+    let words = if key == "d" && words.first() == Some(&HALO) { &words[1..] } else { &words[..] };
     if matches!(words.first(), Some(&("spectral" | "xyz"))) {
         return Err(format!("{key} {} is not understood; give linear red, green and blue", words[0]));
     }

@@ -73,15 +73,17 @@ pub(super) fn material(
 
     for (key, what) in UNUSED {
         if m.number(key).is_some_and(|x| x > 0.0) {
-            let message = format!("material '{}': {key} ({what}) is not supported yet", v.name);
-            notes.add(key, &library.place(m, key), message);
+            let what = format!("{key} ({what}) is not supported yet");
+            notes.add_unsupported(&v.name, key, library.place(m, key), what);
         }
+    }
+    if m.has_halo() {
+        notes.add_unsupported(&v.name, "d_halo", library.place(m, "d"), "d -halo is taken as d".into());
     }
     let uses_kd_map = scattering.albedo_map().is_some();
     let unused = |k: &&str| !(FOLLOWED.contains(k) || uses_kd_map && *k == "map_Kd");
     for key in m.maps().into_iter().filter(unused) {
-        let message = format!("material '{}': {key} is not used yet", v.name);
-        notes.add(key, &library.place(m, key), message);
+        notes.add_unsupported(&v.name, key, library.place(m, key), format!("{key} is not used yet"));
     }
 
     // A writer that leaves Ke out, or black, means the picture itself.
@@ -96,6 +98,7 @@ pub(super) fn material(
         material.opacity = opacity;
     }
     material.set_maps(maps);
+    material.unsupported = notes.take_unsupported();
     Ok(material)
 }
 
@@ -129,9 +132,8 @@ fn texture(
     let reference =
         MapReference::parse(text).map_err(|e| Error::scene(place.clone(), format!("{key}: {e}")))?;
     if !reference.unused.is_empty() {
-        let message =
-            format!("material '{}': {key}'s {} are not followed", m.values.name, reference.unused.join(", "));
-        notes.add("map options", &place, message);
+        let what = format!("{key}'s {} are not followed", reference.unused.join(", "));
+        notes.add_unsupported(&m.values.name, "map_options", place.clone(), what);
     }
     textures.load(&library.file, &reference, content, &place).map(Some)
 }
@@ -157,11 +159,8 @@ impl Surface {
         let (alpha_x, alpha_y) = roughness.unwrap_or((0.0, 0.0));
         let coat = m.number("Pc").unwrap_or(0.0).min(1.0);
         if coat > 0.0 && (ks != Spectrum::ZERO || metalness.is_some_and(|pm| pm > 0.0)) {
-            let message = format!(
-                "material '{}': Pc (clear coat) over Ks or a metal is not supported yet; it is left out",
-                m.values.name
-            );
-            notes.add("Pc", &library.place(m, "Pc"), message);
+            let what = "Pc (clear coat) over Ks or a metal is not supported yet; it is left out".into();
+            notes.add_unsupported(&m.values.name, "Pc", library.place(m, "Pc"), what);
         }
         match metalness.map(|pm| pm.min(1.0)) {
             Some(pm) if pm >= 1.0 => reflector(kd, roughness),
@@ -249,9 +248,8 @@ fn dielectric(
         ));
     }
     if m.color("Tf").is_some_and(|tf| tf != Spectrum::ONE && tf != Spectrum::ZERO) {
-        let message =
-            format!("material '{name}': coloured glass (Tf) is not supported yet; it is taken as clear");
-        notes.add("tf", &library.place(m, "Tf"), message);
+        let what = "coloured glass (Tf) is not supported yet; it is taken as clear".into();
+        notes.add_unsupported(name, "Tf", library.place(m, "Tf"), what);
     }
     let (alpha_x, alpha_y) = roughness.unwrap_or((0.0, 0.0));
     Ok(Scattering::Dielectric { ior, alpha_x, alpha_y })

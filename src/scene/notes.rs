@@ -1,12 +1,17 @@
 //! What a loader remarks on while it goes on, and the suggestion for a misspelt name.
 
 use crate::error::Place;
+use crate::material::Unsupported;
 use crate::settings::nearest;
 
 /// Warnings in the order in which their kinds first appeared. A kind is said once, with its first place and how often
 /// it came, so that a scene of a thousand materials does not fill the screen.
 #[derive(Debug, Default)]
-pub(super) struct Notes(Vec<Note>);
+pub(super) struct Notes {
+    notes: Vec<Note>,
+    /// Of the material that is being read.
+    unsupported: Vec<Unsupported>,
+}
 
 #[derive(Debug)]
 struct Note {
@@ -18,12 +23,23 @@ struct Note {
 impl Notes {
     /// Remarks on something of a `kind` (any label) at a place.
     pub(super) fn add(&mut self, kind: &'static str, place: &Place, message: impl AsRef<str>) {
-        if let Some(note) = self.0.iter_mut().find(|note| note.kind == kind) {
+        if let Some(note) = self.notes.iter_mut().find(|note| note.kind == kind) {
             note.more += 1;
         } else {
             let first = format!("{place}: {}", message.as_ref());
-            self.0.push(Note { kind, first, more: 0 });
+            self.notes.push(Note { kind, first, more: 0 });
         }
+    }
+
+    /// Remarks on what the material `name` asks for by `key` and hrr has not got.
+    pub(super) fn add_unsupported(&mut self, name: &str, key: &'static str, place: Place, what: String) {
+        self.add(key, &place, format!("material '{name}': {what}"));
+        self.unsupported.push(Unsupported { key, what, place });
+    }
+
+    /// What was remarked on as unsupported since this was asked last.
+    pub(super) fn take_unsupported(&mut self) -> Vec<Unsupported> {
+        std::mem::take(&mut self.unsupported)
     }
 
     /// One sentence for each kind.
@@ -32,7 +48,7 @@ impl Notes {
             0 => n.first,
             more => format!("{} (and {more} more of this kind)", n.first),
         };
-        self.0.into_iter().map(say).collect()
+        self.notes.into_iter().map(say).collect()
     }
 }
 

@@ -154,6 +154,7 @@ fn mtl_gaps_are_warnings() {
             "s.mtl:3: material 'm': coloured glass (Tf) is not supported yet; it is taken as clear",
         ),
         ("newmtl m\nPs 0.5", "s.mtl:2: material 'm': Ps (sheen) is not supported yet"),
+        ("newmtl m\nd -halo 0.5", "s.mtl:2: material 'm': d -halo is taken as d"),
         (
             "newmtl m\nKs 0.5\nPc 0.5",
             "s.mtl:3: material 'm': Pc (clear coat) over Ks or a metal is not supported yet; it is left out",

@@ -4,7 +4,7 @@
 use super::tree::{Block, Boxes, Tree};
 use fearless_simd::{Level, Simd, dispatch, f32x4, f32x8, i32x8, mask32x8, prelude::*, u32x4, u32x8};
 use hrr::roulette::min_random::node_bits;
-use hrr::roulette::{Box8, FlatLobe, MinimumRandom, Query, QueryCounters, Vec8, probability};
+use hrr::roulette::{Box8, FlatLobe, MinimumRandom, PAD, Query, QueryCounters, Vec8, probability};
 use hrr::sampler::counter::{mix, unit};
 use hrr::vertex_bvh::NodeId;
 

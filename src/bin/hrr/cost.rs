@@ -9,6 +9,7 @@ use crate::scene_args::{self, SceneArgs};
 use crate::sweep::{Sweep, contenders, sweep_arg};
 use clap::builder::ValueHint;
 use clap::{Arg, ArgAction, ArgMatches, value_parser};
+use hrr::effects::Verdict;
 use hrr::image::{self, Attributes};
 use hrr::integrator::Size;
 use hrr::render::{Observer, Progress};
@@ -272,8 +273,20 @@ fn about(
             "reference",
             owner.map_or("given".into(), |i| format!("mean of all runs of {}", contenders[i].name)),
         ),
+        line("effects", effects(scene, settings)),
         line("settings", settings.to_toml().trim().replace('\n', "; ")),
     ]
+}
+
+/// What the scene calls for, and what the least machinery for it is.
+fn effects(scene: &Scene, settings: &Settings) -> String {
+    let effects = hrr::effects::analyze(scene, settings);
+    let present = effects.findings.iter().filter(|f| f.verdict != Verdict::Absent);
+    let mut words: Vec<_> = present.map(|f| format!("{} {}", f.id, f.verdict.name())).collect();
+    if let Ok(plan) = hrr::integrator::plan::plan(scene, settings, &effects) {
+        words.push(format!("plan: {}, {}", plan.integrator, plan.machinery.join(" ")));
+    }
+    words.join("; ")
 }
 
 fn rayon_threads(settings: &Settings) -> usize {

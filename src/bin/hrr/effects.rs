@@ -2,30 +2,25 @@
 
 use crate::args::{EXIT_CODES, message_args, verbosity};
 use crate::log::{Log, Verbosity};
+use crate::pilot::{Cost, Pilot};
 use crate::scene_args::{self, SceneArgs};
 use clap::{Arg, ArgMatches};
-use hrr::effects::{self, Effect, Effects, Verdict};
+use hrr::effects::{self, Effect, Effects, Finding, Verdict};
 use hrr::integrator::Plan;
 use hrr::integrator::plan::plan;
-use hrr::render::{Silent, counters::Seconds, render};
-use hrr::scene::Scene;
-use hrr::settings::Settings;
 use hrr::{Error, Result};
 use serde::Serialize;
 use std::fmt::Write as _;
 use std::io::Write as _;
 use std::path::Path;
 
-/// Size of the pilot's image and number of its light subpaths.
-const PILOT: (u32, u32, u64) = (64, 48, 4096);
-
 /// The arguments of `hrr effects`.
 #[derive(Debug)]
 pub struct EffectsArgs {
     /// The scene and its settings.
     scene: SceneArgs,
-    /// The one effect whose evidence is wanted.
-    why: Option<Effect>,
+    /// The name of the one effect whose evidence is wanted.
+    why: Option<String>,
     /// For programs, not for people.
     json: bool,
     /// How much is said.
@@ -36,7 +31,7 @@ impl EffectsArgs {
     pub fn new(m: &ArgMatches) -> Self {
         Self {
             scene: SceneArgs::new(m),
-            why: m.get_one::<Effect>("why").copied(),
+            why: m.get_one::<String>("why").cloned(),
             json: m.get_one::<String>("format").is_some_and(|format| format == "json"),
             verbosity: verbosity(m),
         }
@@ -58,7 +53,6 @@ pub fn command() -> clap::Command {
                 .long("why")
                 .value_name("EFFECT")
                 .help_heading(OUTPUT)
-                .value_parser(|text: &str| text.parse::<Effect>())
                 .help("Show the evidence for one verdict: materials, triangles, bounds of textures, paths"),
         )
         .arg(
@@ -87,8 +81,10 @@ struct Row<'a> {
     why: &'a str,
     materials: Vec<&'a str>,
     machinery: &'a [&'a str],
-    /// Share of a short pilot's time; `null` where it is not measured by itself.
+    /// Share of a short pilot's time; `null` where it cannot be told.
     cost_percent: Option<f64>,
+    /// How that is known, or why not.
+    cost_basis: &'a str,
 }
 
 #[derive(Serialize)]
@@ -103,15 +99,15 @@ pub fn run(args: &EffectsArgs, log: &Log) -> Result<u8> {
     args.scene.check()?;
     let (scene, settings) = args.scene.load(|warning| log.warning(warning))?;
     let effects = effects::analyze(&scene, &settings);
-    let text = if let Some(effect) = args.why {
-        why(&effects, effect)
+    let text = if let Some(id) = &args.why {
+        why(&effects, named(&effects, id)?)
     } else {
         let plan = plan(&scene, &settings, &effects)?;
-        let cost = cost(&scene, &settings);
+        let pilot = Pilot::new(&scene, &settings, &effects);
         if args.json {
-            json(&effects, &plan, cost.as_ref())
+            json(&effects, &plan, pilot.as_ref())
         } else {
-            table(&effects, &plan, true, cost.as_ref()).join("\n") + "\n"
+            table(&effects, &plan, true, pilot.as_ref()).join("\n") + "\n"
         }
     };
     let fail = |e: std::io::Error| Error::Output { path: Path::new("-").to_owned(), message: e.to_string() };
@@ -119,37 +115,24 @@ pub fn run(args: &EffectsArgs, log: &Log) -> Result<u8> {
     Ok(0)
 }
 
-/// Where a short pilot spends its time; `None` when it cannot be rendered.
-fn cost(scene: &Scene, settings: &Settings) -> Option<Seconds> {
-    let (mut scene, mut settings) = (scene.clone(), settings.clone());
-    (scene.film.width, scene.film.height, settings.light_subpaths) = PILOT;
-    (settings.samples, settings.iterations, settings.time) = (1, 1, None);
-    render(&scene, &settings, &Silent).ok().map(|outcome| outcome.stats.seconds)
-}
-
-/// An effect's share of a pilot's time, percent; `None` where it is not measured by itself.
-fn percent(effect: Effect, verdict: Verdict, s: &Seconds) -> Option<f64> {
-    let all = s.light_trace + s.vertex_bvh_build + s.eye_trace + s.roulette + s.visibility + s.film;
-    let part = match effect {
-        _ if verdict == Verdict::Absent => 0.0,
-        Effect::Direct => s.visibility,
-        Effect::Interreflection => s.eye_trace,
-        Effect::LightSubpaths => s.light_trace,
-        Effect::Sdg => s.vertex_bvh_build + s.roulette,
-        _ => return None,
-    };
-    (all > 0.0).then(|| (1000.0 * part / all).round() / 10.0)
+/// The finding of a name, be it that of an effect or of what the scene asks for and hrr has not got.
+fn named<'a>(effects: &'a Effects, id: &str) -> Result<&'a Finding> {
+    if let Some(finding) = effects.named(id) {
+        return Ok(finding);
+    }
+    let effect = id.parse::<Effect>().map_err(|e| Error::Usage(format!("--why: {e}")))?;
+    Ok(effects.of(effect))
 }
 
 /// The table, line by line; without what is absent unless `all`.
-pub fn table(effects: &Effects, plan: &Plan, all: bool, cost: Option<&Seconds>) -> Vec<String> {
+pub fn table(effects: &Effects, plan: &Plan, all: bool, pilot: Option<&Pilot>) -> Vec<String> {
     let mut lines = vec![format!(
         "{:<18} {:<11} {:<35} {:<46}{}",
         "effect",
         "verdict",
         "machinery",
         "why",
-        if cost.is_some() { " cost here" } else { "" }
+        if pilot.is_some() { " cost here" } else { "" }
     )];
     for f in effects.findings.iter().filter(|f| all || f.verdict != Verdict::Absent) {
         let machinery = if f.verdict == Verdict::Wanted { f.machinery.join(" ") } else { String::from("-") };
@@ -158,25 +141,35 @@ pub fn table(effects: &Effects, plan: &Plan, all: bool, cost: Option<&Seconds>) 
             let names: Vec<_> = f.materials.iter().map(|w| w.material.as_str()).collect();
             let _ = write!(why, " ({})", names.join(", "));
         }
-        let cost = cost.map_or(String::new(), |seconds| match percent(f.effect, f.verdict, seconds) {
-            Some(percent) => format!(" {percent} %"),
-            None => " -".into(),
+        let cost = pilot.map_or(String::new(), |pilot| match pilot.cost(f) {
+            Cost::Measured(percent) => format!(" {percent} %"),
+            Cost::Estimated(percent) => format!(" est. {percent} %"),
+            Cost::Unknown(reason) => format!(" - ({reason})"),
         });
-        lines.push(format!("{:<18} {:<11} {machinery:<35} {why:<46}{cost}", f.effect.id(), f.verdict.name()));
+        lines.push(format!("{:<18} {:<11} {machinery:<35} {why:<46}{cost}", f.id, f.verdict.name()));
     }
     lines.push(format!("plan: {}, {}", plan.integrator, plan.machinery.join(" ")));
     lines.extend(plan.complaint());
     lines
 }
 
-fn json(effects: &Effects, plan: &Plan, cost: Option<&Seconds>) -> String {
-    let rows = effects.findings.iter().map(|f| Row {
-        id: f.effect.id(),
-        verdict: f.verdict,
-        why: &f.why,
-        materials: f.materials.iter().map(|w| w.material.as_str()).collect(),
-        machinery: if f.verdict == Verdict::Wanted { f.machinery } else { &[] },
-        cost_percent: cost.and_then(|seconds| percent(f.effect, f.verdict, seconds)),
+fn json(effects: &Effects, plan: &Plan, pilot: Option<&Pilot>) -> String {
+    let rows = effects.findings.iter().map(|f| {
+        let (cost_percent, cost_basis) = match pilot.map(|pilot| pilot.cost(f)) {
+            Some(Cost::Measured(percent)) => (Some(percent), "measured"),
+            Some(Cost::Estimated(percent)) => (Some(percent), "estimated: pilots with it and without"),
+            Some(Cost::Unknown(reason)) => (None, reason),
+            None => (None, "no pilot could be rendered"),
+        };
+        Row {
+            id: &f.id,
+            verdict: f.verdict,
+            why: &f.why,
+            materials: f.materials.iter().map(|w| w.material.as_str()).collect(),
+            machinery: if f.verdict == Verdict::Wanted { f.machinery } else { &[] },
+            cost_percent,
+            cost_basis,
+        }
     });
     let plan =
         PlanRow { integrator: plan.integrator.name(), machinery: &plan.machinery, biased: plan.is_biased() };
@@ -186,13 +179,12 @@ fn json(effects: &Effects, plan: &Plan, cost: Option<&Seconds>) -> String {
 }
 
 /// The evidence for one verdict.
-fn why(effects: &Effects, effect: Effect) -> String {
-    let f = effects.of(effect);
-    let mut text = format!("{}: {}: {}\n", effect, f.verdict.name(), f.why);
+fn why(effects: &Effects, f: &Finding) -> String {
+    let mut text = format!("{}: {}: {}\n", f.id, f.verdict.name(), f.why);
     for w in &f.materials {
         let _ = writeln!(text, "  {}, first triangle {}: {}", w.material, w.triangle, w.evidence);
     }
-    for class in effects.classes.iter().filter(|class| class.effect == effect) {
+    for class in effects.classes.iter().filter(|class| class.effect.id() == f.id) {
         let _ = writeln!(text, "  path {class}");
     }
     text

@@ -6,6 +6,7 @@ mod compare;
 mod cost;
 mod effects;
 mod log;
+mod pilot;
 mod predict;
 mod progress;
 mod reference;
