@@ -12,6 +12,7 @@ mod measure;
 mod study;
 
 use hrr::image::{self, Image};
+use hrr::render::counters::processor_seconds;
 use hrr::render::{Silent, render};
 use hrr::settings::Settings;
 use measure::{Cost, Run, Yardstick};
@@ -95,11 +96,11 @@ fn compare(variant: &Variant, recipes: &[Recipe], budget: &Budget, directory: &P
 }
 
 fn run(variant: &Variant, settings: &Settings) -> Run {
-    let (start, cpu) = (Instant::now(), measure::cpu_seconds());
+    let (start, cpu) = (Instant::now(), processor_seconds());
     let outcome = render(&variant.scene, settings, &Silent).expect("a render");
     let cost = Cost {
         seconds: start.elapsed().as_secs_f64(),
-        cpu: measure::cpu_seconds() - cpu,
+        cpu: processor_seconds().zip(cpu).map_or(f64::NAN, |(now, start)| now - start),
         iterations: outcome.stats.iterations,
     };
     Run { image: outcome.film.image(), cost }

@@ -23,6 +23,7 @@ mod workload;
 
 use hrr::film::Film;
 use hrr::math::luminance;
+use hrr::render::counters::processor_seconds;
 use hrr::scene::Scene;
 use hrr::settings::{Heuristic, Integrator, Settings, Switch};
 use hrr::subpath::World;
@@ -54,17 +55,6 @@ fn main() {
     }
 }
 
-/// Processor seconds of all threads, ended ones too, so that other programs on the machine do not count.
-fn process_seconds() -> f64 {
-    #[cfg(unix)]
-    {
-        let now = rustix::time::clock_gettime(rustix::time::ClockId::ProcessCPUTime);
-        now.tv_sec as f64 + now.tv_nsec as f64 * 1e-9
-    }
-    #[cfg(not(unix))]
-    cpu_seconds()
-}
-
 /// Whole renders of `cornell` with a diffuse block, one thread: what the analysis and the choice cost.
 fn auto_where_all_is_diffuse(pairs: usize) {
     let mut scene = load("cornell");
@@ -74,10 +64,10 @@ fn auto_where_all_is_diffuse(pairs: usize) {
     let seconds = |integrator: Integrator| {
         let settings =
             Settings { integrator, threads: 1, iterations: 8, time: None, ..scene.settings.clone() };
-        let start = process_seconds();
+        let start = processor_seconds();
         let outcome = hrr::render::render(&scene, &settings, &hrr::render::Silent).expect("an image");
         assert_eq!(outcome.stats.integrator, "pt");
-        process_seconds() - start
+        processor_seconds().zip(start).map_or(f64::NAN, |(now, start)| now - start)
     };
     let mut ratios: Vec<f64> = (0..pairs)
         .map(|i| match i % 2 {

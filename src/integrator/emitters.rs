@@ -129,7 +129,7 @@ impl Bidirectional<'_> {
     }
 
     /// Light straight from what the roulette keeps of an iteration's points.
-    pub(super) fn light_of_emitters(
+    pub(super) fn play_emitters(
         &self,
         vertex: &EyeVertex,
         sampler: &Sampler,

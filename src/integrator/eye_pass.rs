@@ -67,7 +67,7 @@ impl Bidirectional<'_> {
             if !vertex.walk.vertex.bsdf.is_delta() {
                 rest += self.next_event(&vertex, sample, clock, tally);
                 if !vertex.lobes.is_empty() {
-                    rest += self.light_of_emitters(&vertex, &sample.sampler, clock, tally);
+                    rest += self.play_emitters(&vertex, &sample.sampler, clock, tally);
                     if sample.plays > 0.0 {
                         let sampler = &sample.sampler;
                         self.play_roulette(&vertex, sampler, clock, tally, &mut |_, value| kept += value);

@@ -125,6 +125,17 @@ pub fn peak_rss_bytes() -> Option<u64> {
     Some(kibibytes * 1024)
 }
 
+/// Processor seconds of the program so far, over all threads, ended ones too; `None` where the system does not say.
+pub fn processor_seconds() -> Option<f64> {
+    #[cfg(unix)]
+    {
+        let now = rustix::time::clock_gettime(rustix::time::ClockId::ProcessCPUTime);
+        Some(now.tv_sec as f64 + now.tv_nsec as f64 * 1e-9)
+    }
+    #[cfg(not(unix))]
+    None
+}
+
 /// The machine's memory, bytes; 4e9 where the system does not tell.
 pub(super) fn machine_bytes() -> u64 {
     let told = std::fs::read_to_string("/proc/meminfo").ok().and_then(|text| {

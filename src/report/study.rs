@@ -8,6 +8,7 @@ use crate::image::Image;
 use crate::integrator;
 use crate::math::luminance;
 use crate::math::relative::{Tiles, floor, local_square, trimmed_mean};
+use crate::render::counters::processor_seconds;
 use crate::render::noise::TRIMMED;
 use crate::sampler::counter::combine;
 use crate::scene::Scene;
@@ -75,19 +76,9 @@ struct Cost {
     stages: [f64; 5],
 }
 
-/// Processor seconds of the program so far, over all threads.
-fn cpu_seconds() -> Option<f64> {
-    #[cfg(unix)]
-    {
-        let now = rustix::time::clock_gettime(rustix::time::ClockId::ProcessCPUTime);
-        Some(now.tv_sec as f64 + now.tv_nsec as f64 * 1e-9)
-    }
-    #[cfg(not(unix))]
-    None
-}
-
 /// Runs it. Each run of each setting gets an equal share of `seconds`; the first runs show how many iterations that is.
-/// `runs` is at least 2. `exposure`: stops by which images are brighter when FLIP judges them. `tell` is told the finished share; false from it ends the study with an error.
+/// `runs` is at least 2. `exposure`: stops by which images are brighter when FLIP judges them. `tell` is told the finished
+/// share; false from it ends the study with an error.
 ///
 /// # Errors
 /// What rendering reports; [`Error::Memory`] when the images would not fit.
@@ -140,7 +131,7 @@ fn climb(
     seconds: f64,
     longest: Option<u64>,
 ) -> Result<Ladder> {
-    let (start, cpu_before) = (Instant::now(), cpu_seconds());
+    let (start, cpu_before) = (Instant::now(), processor_seconds());
     let mut machine = integrator::new(world, settings)?;
     let setup = start.elapsed().as_secs_f64();
     let mut film = Film::new(&scene.film);
@@ -162,7 +153,7 @@ fn climb(
         let done = iteration + 1;
         if done.is_power_of_two() {
             ladder.images.push(film.image());
-            let cpu = cpu_seconds().zip(cpu_before).map(|(now, before)| now - before);
+            let cpu = processor_seconds().zip(cpu_before).map(|(now, before)| now - before);
             ladder.costs.push(Cost { iterations: done, seconds: elapsed, setup, cpu, stages });
             // The next rung takes as long as all so far.
             let up = match longest {

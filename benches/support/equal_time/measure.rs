@@ -157,14 +157,3 @@ pub fn summary(runs: &[Run], errors: &[Errors]) -> String {
         over(&|r| errors[r].trimmed),
     )
 }
-
-/// Of all threads together.
-pub fn cpu_seconds() -> f64 {
-    #[cfg(unix)]
-    {
-        let now = rustix::time::clock_gettime(rustix::time::ClockId::ProcessCPUTime);
-        now.tv_sec as f64 + now.tv_nsec as f64 * 1e-9
-    }
-    #[cfg(not(unix))]
-    f64::NAN
-}
