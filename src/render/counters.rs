@@ -169,7 +169,7 @@ mod tests {
         assert_eq!(
             keys(&json),
             sorted(
-                "version scene integrator visibility threads seed width height iterations effects seconds \
+                "version scene integrator machinery biased visibility threads seed width height iterations effects seconds \
                  counters memory"
             )
         );
