@@ -196,6 +196,19 @@ impl Film {
         Ok(())
     }
 
+    /// Adds what another film of the same size has, times a factor, as samples that are counted elsewhere.
+    pub fn add_scaled(&self, other: &Film, factor: f64) {
+        let scale = factor * f64::from(self.weight);
+        for (row, other) in self.rows.iter().zip(&other.rows) {
+            let mut row = row.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
+            let other = other.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
+            for (sum, v) in row.iter_mut().flatten().zip(other.iter().flatten()) {
+                *sum = sum.saturating_add((*v as f64 * scale) as i128);
+            }
+        }
+        self.dropped.fetch_add(other.dropped(), Ordering::Relaxed);
+    }
+
     /// The sums of a row of pixels, in double precision.
     pub fn row(&self, y: u32) -> Vec<Spectrum> {
         let row = self.rows[y as usize].lock().unwrap_or_else(|poisoned| poisoned.into_inner());
@@ -256,6 +269,17 @@ mod tests {
         film.add(DVec2::ONE, Spectrum::splat(5.0));
         film.count_samples(1);
         assert_eq!((film.samples(), film.mean(1, 1)), (2, Spectrum::splat(4.0)));
+    }
+
+    #[test]
+    fn a_film_can_be_added_in_part() {
+        let (mut film, other) = (film(Filter::Box), film(Filter::Box));
+        other.add(DVec2::ONE, Spectrum::splat(8.0));
+        film.set_weight(3);
+        film.add(DVec2::ONE, Spectrum::ONE);
+        film.add_scaled(&other, 0.25);
+        film.count_samples(1);
+        assert_eq!(film.mean(1, 1), Spectrum::splat(3.0));
     }
 
     #[test]

@@ -175,7 +175,7 @@ fn growing_and_adapting_keep_the_mean() {
             let mut integrator = hrr::integrator::new(&world, &settings).unwrap();
             let mut film = Film::new(&scene.film);
             integrator.adapt();
-            // Half of the renders have no time for the second half of their samples, the others have twice as much.
+            // Half of the renders have time for a part of their samples only, the others for four times as many.
             integrator.finish_by(Instant::now() + Duration::from_secs(seed % 2 * 1000));
             for (iteration, samples) in [2, 6, 24].into_iter().enumerate() {
                 let light_subpaths = 1280 * u64::from(samples);

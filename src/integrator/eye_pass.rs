@@ -32,6 +32,9 @@ impl Bidirectional<'_> {
             None => 1,
         };
         let mut parts = Parts::new(of);
+        // How much the samples count for is known when all have been taken.
+        let apart = self.deadline.map(|_| Film::new(&self.world.scene.film));
+        let whole = apart.as_ref().unwrap_or(film);
         // Set aside, since the samples look at the rest of the machine.
         let mut adaptive = self.adaptive.take();
         while let Some(part) = parts.next(self.deadline) {
@@ -43,7 +46,7 @@ impl Bidirectional<'_> {
             }
             let on_part = |fraction: f64| progress((f64::from(index) + fraction) / f64::from(parts.end));
             tally.add(&tile::sample_film(
-                film,
+                whole,
                 key,
                 part,
                 adaptive.as_mut(),
@@ -52,6 +55,9 @@ impl Bidirectional<'_> {
             ));
         }
         self.adaptive = adaptive;
+        if let Some(apart) = &apart {
+            film.add_scaled(apart, parts.scale());
+        }
     }
 
     /// What an eye sample sees.

@@ -9,13 +9,11 @@ pub(super) struct Part {
     pub index: u32,
     /// How many there were to be.
     pub of: u32,
-    /// What it counts for, of the iteration.
-    pub share: f64,
 }
 
 impl Part {
     /// All samples at once.
-    pub const ALL: Self = Self { index: 0, of: 1, share: 1.0 };
+    pub const ALL: Self = Self { index: 0, of: 1 };
 
     /// Which of a pixel's samples belong to it: one at least. There is no end to them, should there be more parts.
     pub fn range(&self, samples: u32) -> std::ops::Range<u32> {
@@ -27,41 +25,45 @@ impl Part {
 /// Parts of an eye pass that must end in time, and samples in each at least.
 pub(super) const PARTS: u32 = 8;
 pub(super) const LEAST_SAMPLES: u32 = 4;
+/// Parts that are taken while there is time, over those that were to be.
+const MOST: u32 = 4;
 
-/// The parts that the eye samples of an iteration are taken in. When half of them are done, what these took tells how many
-/// more there is time for; these then count for the other half.
+/// The parts that the eye samples of an iteration are taken in: as many as there is time for.
 pub(super) struct Parts {
     of: u32,
-    done: u32,
-    /// How many there are, as far as is known.
+    /// How many were taken.
+    pub done: u32,
+    /// How many there will be, as far as is known.
     pub end: u32,
     start: Instant,
 }
 
 impl Parts {
-    /// As many as that, if there is time.
+    /// As many as that, unless there is a deadline.
     pub fn new(of: u32) -> Self {
         Self { of, done: 0, end: of, start: Instant::now() }
     }
 
     /// The next one, if there is one.
     pub fn next(&mut self, deadline: Option<Instant>) -> Option<Part> {
-        let (half, index) = (self.of / 2, self.done);
-        if half > 0
-            && index == half
+        let index = self.done;
+        if index > 0
             && let Some(deadline) = deadline
         {
-            let each = self.start.elapsed().as_secs_f64() / f64::from(half);
+            let each = self.start.elapsed().as_secs_f64() / f64::from(index);
             let left = deadline.saturating_duration_since(Instant::now()).as_secs_f64();
-            self.end = half + ((left / each).round() as u32).clamp(1, 2 * (self.of - half));
+            self.end = (index + (left / each).round() as u32).min(MOST * self.of);
         }
         if index == self.end {
             return None;
         }
         self.done += 1;
-        let planned = if index < half { 1 } else { self.of - half };
-        let taken = if index < half { 1 } else { self.end - half };
-        Some(Part { index, of: self.of, share: f64::from(planned) / f64::from(self.of) / f64::from(taken) })
+        Some(Part { index, of: self.of })
+    }
+
+    /// What the parts that were taken count for, over the iteration that they are to be.
+    pub fn scale(&self) -> f64 {
+        f64::from(self.of) / f64::from(self.done)
     }
 }
 
@@ -75,16 +77,14 @@ mod tests {
         for of in [1, 2, 3, 8, 13] {
             let soon = Some(Instant::now());
             let late = Some(Instant::now() + Duration::from_secs(1000));
-            let half = of / 2;
-            let rest = |least: u32| if half == 0 { of } else { half + least };
-            for (deadline, count) in [(None, of), (soon, rest(1)), (late, rest(2 * (of - half)))] {
-                let (mut parts, mut shares, mut indices) = (Parts::new(of), 0.0, Vec::new());
+            for (deadline, count) in [(None, of), (soon, 1), (late, MOST * of)] {
+                let (mut parts, mut indices) = (Parts::new(of), Vec::new());
                 while let Some(part) = parts.next(deadline) {
-                    shares += part.share;
+                    assert_eq!(part.of, of);
                     indices.push(part.index);
                 }
-                assert!((shares - 1.0).abs() < 1e-12, "{of}: {shares}");
                 assert_eq!(indices, (0..count).collect::<Vec<_>>(), "{of}");
+                assert_eq!(parts.scale() * f64::from(count), f64::from(of));
             }
         }
     }

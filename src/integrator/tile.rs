@@ -61,7 +61,7 @@ pub(super) fn sample_film(
                             .map_or(PixelPlan { samples, share: 1.0 }, |plans| plans.pixel(x, y, samples));
                         let taken = part.range(plan.samples);
                         // A pixel of fewer or more samples than it counts.
-                        let scale = f64::from(samples) * part.share / taken.len() as f64;
+                        let scale = f64::from(samples) / f64::from(part.of) / taken.len() as f64;
                         let offset =
                             if plan.share < 1.0 { pixel_offset(seed, iteration, pixel) } else { 0.0 };
                         let family = Family::new(seed, iteration, Stream::Eye, pixel);

@@ -104,7 +104,7 @@ impl Sizing {
         let [light, eye] = last.tally.sides;
         let took = (light + eye).max(1e-9);
         let pilot = (PILOT.0 * self.time).clamp(PILOT.1, PILOT.2);
-        let mut seconds = if took < 0.25 * pilot { pilot.min(left) } else { left };
+        let mut seconds = if took < 0.7 * pilot { pilot.max(2.0 * took).min(left) } else { left };
         if self.open == Open::Samples {
             seconds = seconds.min((self.time / PARTS).max(pilot));
         }
