@@ -265,12 +265,12 @@ fn nothing_but_plain_lines_goes_to_a_pipe() {
 fn time_is_a_budget_too() {
     let place = Place::new();
     let start = std::time::Instant::now();
-    let (code, out, err) = place.run("render scene.toml -o a.exr --stats - --time 0.3");
+    let (code, out, err) = place.run("render scene.toml -o a.exr --stats - --time 1");
     assert_eq!(code, 0, "{err}");
     let stats: serde_json::Value = serde_json::from_str(&out).unwrap();
     assert!(stats["iterations"].as_u64().unwrap() > 2, "{out}");
     // The last hundredths of the time are not worth another iteration.
-    assert!(stats["seconds"]["render"].as_f64().unwrap() >= 0.29 && start.elapsed().as_secs_f64() < 20.0);
+    assert!(stats["seconds"]["render"].as_f64().unwrap() >= 0.97 && start.elapsed().as_secs_f64() < 20.0);
 }
 
 /// Starts a render that takes very long and waits until it says that it renders.
