@@ -52,7 +52,8 @@ impl Parts {
         {
             let each = self.start.elapsed().as_secs_f64() / f64::from(index);
             let left = deadline.saturating_duration_since(Instant::now()).as_secs_f64();
-            self.end = (index + (left / each).round() as u32).min(MOST * self.of);
+            let most = MOST * self.of;
+            self.end = most.min(index + (left / each).round().min(f64::from(most)) as u32);
         }
         if index == self.end {
             return None;
