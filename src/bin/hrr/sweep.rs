@@ -31,8 +31,12 @@ const ROULETTE: [(&str, &str); 11] = [
     ("hrr_alpha", "0.05"),
     ("connections", "4"),
 ];
-const RAYS: [(&str, &str); 3] =
-    [("visibility", "obvhs"), ("embree_robust", "off"), ("embree_build", "medium,low")];
+/// Without Embree there is one way to trace rays.
+const RAYS: &[(&str, &str)] = if cfg!(feature = "embree") {
+    &[("visibility", "obvhs"), ("embree_robust", "off"), ("embree_build", "medium,low")]
+} else {
+    &[]
+};
 
 /// `--sweep`.
 pub fn sweep_arg() -> Arg {
@@ -112,9 +116,7 @@ fn usual(base: &Settings) -> Vec<Sweep> {
     if recipe.is_some() {
         add(&LIGHT);
     }
-    if cfg!(feature = "embree") {
-        add(&RAYS);
-    }
+    add(RAYS);
     if recipe.is_some() {
         let times = |factor: f64| ((base.light_subpaths as f64 * factor).max(1.0) as u64).to_string();
         sweeps.push(Sweep { name: "light_subpaths", values: vec![times(0.1), times(10.0)] });
@@ -139,7 +141,7 @@ mod tests {
 
     #[test]
     fn the_usual_values_are_values() {
-        for (name, values) in LIGHT.iter().chain(&ROULETTE).chain(&RAYS) {
+        for (name, values) in LIGHT.iter().chain(&ROULETTE).chain(RAYS) {
             let sweep = parse(&format!("{name}={values}")).unwrap();
             for value in sweep.values {
                 let mut changed = Settings::default();
