@@ -19,6 +19,9 @@ if [ -z "$library" ]; then
     library=$(sed -n 's/.*"filenames":\["\([^"]*\/libhrr[^"]*\)".*/\1/p' "$scratch/messages" | tail -n 1)
 fi
 cp "$library" "$scratch/libhrr.so"
+# An installed library is looked for by its SONAME.
+soname=$(readelf -d "$scratch/libhrr.so" | sed -n 's/.*(SONAME).*\[\(.*\)\]/\1/p')
+[ -z "$soname" ] || ln -sf libhrr.so "$scratch/$soname"
 link=(-g -O1 -Iinclude -L"$scratch" -Wl,-rpath,"$scratch" -lhrr -lpthread -lm)
 every=(tests/ffi/every_function.c -std=c99 -D_POSIX_C_SOURCE=200809L)
 arguments=("$scratch" scenes/cornell/scene.toml)
