@@ -16,30 +16,8 @@ const LAMP_SIDE: f64 = 0.02;
 /// The funnel's axis, its height, and its radii below and above.
 const FUNNEL: (DVec3, f64, [f64; 2]) = (dvec3(0.0, 0.02, -1.75), 0.95, [0.62, 0.86]);
 
-const MTL: &str = "\
-newmtl floor
-Kd 0.62 0.58 0.52
-
-newmtl wall
-Kd 0.22 0.34 0.38
-
-newmtl wood
-Kd 0.20 0.11 0.06
-
-newmtl red
-Kd 0.65 0.09 0.06
-
-newmtl blue
-Kd 0.10 0.22 0.50
-
-newmtl lamp
-Kd 0 0 0
-Ke 8000 7200 6100
-
-newmtl sky
-Kd 0 0 0
-Ke 0.45 0.53 0.65
-
+/// The metals in terms of MTL, beside the common colours.
+const METALS: &str = "
 # Brushed steel; GGX roughness, not squared, along the grooves and across them.
 newmtl steel
 Kd 0 0 0
@@ -91,7 +69,7 @@ pub fn files() -> Vec<File> {
         .add(&mut obj, "strip", "brass");
     parts::lamp(&mut obj, LAMP, STAGE, LAMP_SIDE);
     shade(&mut obj);
-    scene("brushed_funnel", obj, MTL, &format!("# {comment}.\n{TOML}"))
+    scene("brushed_funnel", obj, &(parts::MTL.to_owned() + METALS), &format!("# {comment}.\n{TOML}"))
 }
 
 /// An open funnel on a wooden foot; its inside is wood too.

@@ -13,31 +13,6 @@ const LAMP: DVec3 = dvec3(-1.12, 0.62, -1.39);
 /// Side of the square lamp.
 const LAMP_SIDE: f64 = 0.02;
 
-const MTL: &str = "\
-newmtl floor
-Kd 0.62 0.58 0.52
-
-newmtl wall
-Kd 0.22 0.34 0.38
-
-newmtl wood
-Kd 0.20 0.11 0.06
-
-newmtl red
-Kd 0.65 0.09 0.06
-
-newmtl blue
-Kd 0.10 0.22 0.50
-
-newmtl lamp
-Kd 0 0 0
-Ke 8000 7200 6100
-
-newmtl sky
-Kd 0 0 0
-Ke 0.45 0.53 0.65
-";
-
 /// The mirror and the strip in terms of MTL, for programs that know nothing of `scene.toml`.
 const METALS: &str = "
 # Extremely glossy: GGX roughness 1e-4, not squared.
@@ -93,7 +68,7 @@ pub fn mirror() -> Vec<File> {
     scene(
         "caustic_mirror",
         with_strip(comment),
-        &(MTL.to_owned() + &METALS.replace("{alpha_y}", "1e-4")),
+        &(parts::MTL.to_owned() + &METALS.replace("{alpha_y}", "1e-4")),
         &toml,
     )
 }
@@ -102,7 +77,7 @@ pub fn mirror() -> Vec<File> {
 pub fn mirror_aniso() -> Vec<File> {
     let comment = "A lamp, a brass strip, and a brushed mirror that shows the caustic it throws on the floor";
     let toml = format!("# {comment}.\nobj = [\"scene.obj\"]\n\n{CAMERA}{}", metals_toml("1e-2"));
-    let mtl = MTL.to_owned() + &METALS.replace("{alpha_y}", "1e-2");
+    let mtl = parts::MTL.to_owned() + &METALS.replace("{alpha_y}", "1e-2");
     scene("caustic_mirror_aniso", with_strip(comment), &mtl, &toml)
 }
 
@@ -116,7 +91,7 @@ pub fn glass() -> Vec<File> {
         "# {comment}.\nobj = [\"scene.obj\"]\n\n{CAMERA}{}\n[material.glass]\ntype = \"dielectric\"\nior  = 1.5\n",
         mirror_toml("1e-4")
     );
-    scene("glass_caustic", obj, &(MTL.to_owned() + GLASS), &toml)
+    scene("glass_caustic", obj, &(parts::MTL.to_owned() + GLASS), &toml)
 }
 
 fn mirror_toml(alpha_y: &str) -> String {

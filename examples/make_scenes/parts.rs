@@ -4,6 +4,32 @@ use super::obj::Obj;
 use glam::{DAffine3, DVec3, dvec3};
 use std::f64::consts::TAU;
 
+/// Colours of the rooms of a caustic, and what shines in them.
+pub const MTL: &str = "\
+newmtl floor
+Kd 0.62 0.58 0.52
+
+newmtl wall
+Kd 0.22 0.34 0.38
+
+newmtl wood
+Kd 0.20 0.11 0.06
+
+newmtl red
+Kd 0.65 0.09 0.06
+
+newmtl blue
+Kd 0.10 0.22 0.50
+
+newmtl lamp
+Kd 0 0 0
+Ke 8000 7200 6100
+
+newmtl sky
+Kd 0 0 0
+Ke 0.45 0.53 0.65
+";
+
 /// A square lamp that faces a point.
 pub fn lamp(obj: &mut Obj, center: DVec3, faces: DVec3, side: f64) {
     let normal = (faces - center).normalize();
