@@ -134,8 +134,8 @@ impl EyeVertex {
         let (heuristic, side, m) = (techniques.heuristic, &self.walk.side, &self.m_previous);
         Total {
             known: heuristic.total(side, m.known, back, 0.0),
-            stored: heuristic.total(side, m.stored, 0.0, techniques.eta()),
-            seen: heuristic.total(side, m.seen, 0.0, 0.0),
+            stored: heuristic.total(side, m.stored, 0.0, 0.0),
+            seen: heuristic.total(side, m.seen, 0.0, techniques.eta()),
         }
     }
 
@@ -251,11 +251,11 @@ impl EyeVertex {
     pub fn merge(&self, techniques: &Techniques, merging: &Merging, light: &Walk) -> Spectrum {
         let vertex = &self.walk.vertex;
         let value = self.walk.throughput * vertex.factor(vertex.wo, light.vertex.wo) * light.throughput;
-        let stored = techniques.stored(light);
-        if value == Spectrum::ZERO || stored == 0.0 {
+        let merged = techniques.seen(light);
+        if value == Spectrum::ZERO || merged == 0.0 {
             return Spectrum::ZERO;
         }
-        let eta = merging.eta() * stored;
+        let eta = merging.eta() * merged;
         let light_total = techniques.light_total(light, vertex.wo);
         let eye_total = self.total(techniques, light.vertex.wo, light.origins[0]);
         value * (techniques.heuristic.merging_weight(light_total, eta, eye_total) / eta)

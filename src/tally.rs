@@ -32,6 +32,8 @@ pub struct Tally {
     pub eye_trace: f64,
     /// Seconds in roulette queries.
     pub roulette_seconds: f64,
+    /// Seconds playing the roulette: in its queries, and in connections to what they keep. Part of the other sums.
+    pub playing: f64,
     /// Seconds in the eye side's shadow rays.
     pub visibility: f64,
     /// Seconds adding to the film.
@@ -54,6 +56,7 @@ impl Tally {
         self.vertex_bvh_build += other.vertex_bvh_build;
         self.eye_trace += other.eye_trace;
         self.roulette_seconds += other.roulette_seconds;
+        self.playing += other.playing;
         self.visibility += other.visibility;
         self.film += other.film;
     }

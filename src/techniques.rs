@@ -259,7 +259,7 @@ impl Techniques {
         self.storing.probability(Role::Stored, light.origins[0])
     }
 
-    /// 1 or 0: whether the camera is connected to a light vertex.
+    /// 1 or 0: whether the camera is connected to a light vertex, and eye vertices are merged with it.
     pub fn seen(&self, light: &Walk) -> f64 {
         self.storing.probability(Role::Seen, light.origins[0])
     }
@@ -308,7 +308,7 @@ impl Techniques {
         Rules { transport, heuristic: self.heuristic, storing: self.storing }
     }
 
-    /// eta at vertices that are not delta, over the probability of storing; 0 without merging.
+    /// eta at vertices that are not delta, where they are merged at all; 0 without merging.
     pub fn eta(&self) -> f64 {
         self.merging.map_or(0.0, |merging| merging.eta())
     }
@@ -322,7 +322,7 @@ impl Techniques {
     /// The sum over the light side's techniques up to a light vertex from which the path goes on along `w_eye`.
     pub fn light_total(&self, light: &Walk, w_eye: DVec3) -> f64 {
         let back = light.vertex.pdf_w(w_eye, light.vertex.wo);
-        let merging = self.stored(light) * self.eta();
+        let merging = self.seen(light) * self.eta();
         self.heuristic.total(&light.side, self.before(light, w_eye), back, merging)
     }
 
@@ -332,7 +332,7 @@ impl Techniques {
             if s.delta {
                 return Total::known(self.heuristic.total(&light.side, 0.0, s.pdf_rev, 0.0));
             }
-            let merging = self.stored(light) * self.eta();
+            let merging = self.seen(light) * self.eta();
             Total::known(self.heuristic.total(&light.side, self.before(light, s.wi), s.pdf_rev, merging))
         })
     }

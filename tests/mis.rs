@@ -156,7 +156,7 @@ impl Path {
         let b = |s: usize| (0..s).map(fw).product::<f64>() * (s..k - 1).map(rv).product::<f64>();
         let eta = t.merging.map_or(0.0, |m| m.light_subpaths * std::f64::consts::PI * m.radius * m.radius);
         let merging = |i: usize| {
-            if i == 0 || i > k - 2 || delta(i) { 0.0 } else { has(Role::Stored, i) * eta * b(i) * fw(i) }
+            if i == 0 || i > k - 2 || delta(i) { 0.0 } else { has(Role::Seen, i) * eta * b(i) * fw(i) }
         };
         [(0..k).map(|s| m(s) * b(s)).collect(), (0..k).map(merging).collect()]
     }
@@ -230,7 +230,7 @@ fn led_to(world: &World<'_>, t: &Techniques, light: &Walk, end: &Vertex) -> Opti
 
 fn close(what: &str, by_recursion: f64, by_definition: f64) {
     let error = (by_recursion - by_definition).abs();
-    assert!(error < 1e-9 * by_definition.abs() + 1e-12, "{what}: {by_recursion} is not {by_definition}");
+    assert!(error < 1e-10 * by_definition.abs() + 1e-13, "{what}: {by_recursion} is not {by_definition}");
 }
 
 #[test]
@@ -406,7 +406,7 @@ fn check(world: &World<'_>, t: &Techniques) {
             let (y, z) = (&light.vertex, &eye.walk.vertex);
             let merging = t.merging.as_ref().unwrap();
             let value = eye.merge(t, merging, &light);
-            let tries = merging.eta() * t.stored(&light);
+            let tries = merging.eta() * t.seen(&light);
             let plain = eye.walk.throughput * z.factor(z.wo, y.wo) * light.throughput / tries;
             if plain.x > 0.0 && tries > 0.0 {
                 close("merging", value.x / plain.x, path.weight(world, t, 1, lights.len() + 1));

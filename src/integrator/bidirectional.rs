@@ -1,17 +1,18 @@
 //! The bidirectional machine: light pass, vertex BVH, eye pass. What it does in each is a [`Recipe`].
 
+use super::adaptive::Adaptive;
+use super::balance::Costs;
 use super::emitters::EmitterPoints;
 use super::merging;
 use super::recipe::{Base, Recipe};
 use super::records::Records;
-use super::spread::Adaptive;
 use super::{Integrator, Size};
 use crate::effects::Lobes;
 use crate::error::Result;
 use crate::film::Film;
 use crate::light_cache::LightCache;
-use crate::roulette::{MinimumRandom, Pregenerated};
-use crate::sampler::{Purpose, Sampler, Stream};
+use crate::roulette::Pregenerated;
+use crate::sampler::Stream;
 use crate::scene::Scene;
 use crate::settings::{Settings, Switch};
 use crate::subpath::{Storing, World};
@@ -35,11 +36,14 @@ pub struct Bidirectional<'a> {
     pub(super) guided_by: u64,
     /// Radius of merging in the first iteration, world units.
     first_radius: f64,
-    /// Light vertices for the roulette and for merging.
+    /// Light vertices for the roulette, or all where it is off.
     pub(super) cache: LightCache,
-    /// All vertices of the first light subpaths, for uniform picks, where `cache` has not got them all.
-    pub(super) picks: LightCache,
+    /// Over `cache`.
     pub(super) bvh: VertexBvh,
+    /// All vertices of the first light subpaths, for picks, or of all subpaths, for merging, where `cache` has not got them.
+    pub(super) all: LightCache,
+    /// Over `all`, for merging.
+    pub(super) all_bvh: VertexBvh,
     pub(super) emitters: EmitterPoints,
     /// The roulette's numbers for `bvh`, where all queries share them.
     pub(super) numbers: Option<Pregenerated>,
@@ -61,8 +65,9 @@ impl<'a> Bidirectional<'a> {
             guided_by: 0,
             first_radius: if recipe.merging { merging::first_radius(world, settings) } else { 0.0 },
             cache: LightCache::default(),
-            picks: LightCache::default(),
             bvh: VertexBvh::new(),
+            all: LightCache::default(),
+            all_bvh: VertexBvh::new(),
             emitters: EmitterPoints::default(),
             numbers: None,
             records: Records::default(),
@@ -80,23 +85,10 @@ impl<'a> Bidirectional<'a> {
         !mesh.materials.iter().any(|&m| open[m as usize])
     }
 
-    /// Makes the tree over the cache's vertices, and the numbers of the stream's iteration that its queries share.
-    pub(super) fn build_tree(&mut self, stream: Stream, iteration: u64) -> Result<()> {
-        self.bvh.build(self.cache.positions())?;
-        let shared = self.recipe.roulette && MinimumRandom::of(self.settings.minimum).is_none();
-        self.numbers = shared.then(|| {
-            let sampler = Sampler::new(self.settings.seed, iteration, stream, 0);
-            Pregenerated::new(&self.bvh, sampler.bits(0, Purpose::Roulette))
-        });
-        Ok(())
-    }
-
     /// Sets how often each technique tries, per eye sample.
     pub(super) fn plan(&mut self) {
-        // Merging wants all light vertices.
-        let thin = self.recipe.roulette && !self.recipe.merging;
         self.techniques.storing = Storing {
-            share: if thin { self.settings.storing } else { 1.0 },
+            share: if self.recipe.roulette { self.settings.storing } else { 1.0 },
             max_alpha: self.settings.hrr_alpha,
             lamps: !self.recipe.next_event,
         };
@@ -105,6 +97,7 @@ impl<'a> Bidirectional<'a> {
         // The weights must not depend on an iteration's own number of vertices, hence a pre-pass of its own numbers.
         let [stored, all] = self.vertices_per_subpath();
         let vertices = (n_l * stored).max(1.0);
+        let expected = self.settings.expected * self.adaptive.as_ref().map_or(1.0, Adaptive::kept);
         let on = |switch: bool, m: f64| if switch { m } else { 0.0 };
         self.techniques = Techniques {
             heuristic: self.settings.mis,
@@ -127,7 +120,7 @@ impl<'a> Bidirectional<'a> {
             guide: self.techniques.guide.clone(),
             roulette: recipe.roulette.then(|| Roulette {
                 light_subpaths: n_l / eye_samples,
-                constant: self.settings.expected * area / vertices,
+                constant: expected * area / vertices,
                 // On the axis of lobes of weight c, C c / d^2 is then at most X at d^2 = A / 4 pi.
                 most: self.settings.axis_probability.map_or(f64::INFINITY, |x| x * area / (4.0 * PI)),
                 max_alpha: self.settings.hrr_alpha,
@@ -163,6 +156,10 @@ impl Integrator for Bidirectional<'_> {
         }
     }
 
+    fn light_share(&self, costs: &Costs) -> Option<f64> {
+        self.adaptive.as_ref()?.light_share(costs)
+    }
+
     fn finish_by(&mut self, deadline: Instant) {
         self.deadline = Some(deadline);
     }
@@ -173,11 +170,14 @@ impl Integrator for Bidirectional<'_> {
             light_subpaths: self.size.light_subpaths as f64,
             radius: merging::radius(self.first_radius, self.settings.merge_shrink, iteration),
         });
+        if let Some(adaptive) = &mut self.adaptive {
+            adaptive.begin(&self.world.scene.film, self.size);
+        }
         let on_light_side = |fraction| progress(LIGHT_SHARE * fraction);
         let mut tally = self.light_pass(Stream::Light, iteration, Some(film), &on_light_side);
         if self.recipe.roulette || self.recipe.merging {
             let build = Instant::now();
-            self.build_tree(Stream::Light, iteration)?;
+            self.build_trees(Stream::Light, iteration)?;
             tally.vertex_bvh_build += build.elapsed().as_secs_f64();
         }
         self.draw_emitters(iteration)?;
@@ -186,14 +186,17 @@ impl Integrator for Bidirectional<'_> {
         let on_eye_side = |fraction| progress(LIGHT_SHARE + (1.0 - LIGHT_SHARE) * fraction);
         self.eye_pass(iteration, film, &on_eye_side, &mut tally);
         tally.sides[1] = start.elapsed().as_secs_f64();
+        if let Some(adaptive) = &mut self.adaptive {
+            adaptive.moderate(&tally);
+        }
         film.count_samples(u64::from(self.size.samples));
         Ok(tally)
     }
 
     fn bytes(&self) -> (usize, usize) {
         let (points, tree) = self.emitters.bytes();
-        let caches = self.cache.bytes() + self.picks.bytes() + self.records.bytes();
+        let caches = self.cache.bytes() + self.all.bytes() + self.records.bytes();
         let numbers = self.numbers.as_ref().map_or(0, Pregenerated::bytes);
-        (caches + points, self.bvh.bytes() + numbers + tree)
+        (caches + points, self.bvh.bytes() + self.all_bvh.bytes() + numbers + tree)
     }
 }

@@ -4,8 +4,8 @@ use super::bidirectional::Bidirectional;
 use super::parts::{self, Part, Parts};
 use super::recipe::Base;
 use super::records::{self, Records};
-use super::spread::Seen;
 use super::tile::{self, Sample};
+use super::watched::Seen;
 use crate::connect::{EyeVertex, Onward};
 use crate::film::Film;
 use crate::math::Spectrum;
@@ -40,7 +40,7 @@ impl Bidirectional<'_> {
         while let Some(part) = parts.next(self.deadline) {
             let Part { index, .. } = part;
             if records {
-                let cache = self.picks().0;
+                let cache = self.all().0;
                 let part = (iteration, index);
                 self.records = Records::new(self.world, self.settings, &self.techniques, cache, part, tally);
             }
@@ -53,6 +53,9 @@ impl Bidirectional<'_> {
                 &on_part,
                 |sample, clock, tally| self.radiance(sample, clock, tally),
             ));
+        }
+        if let Some(adaptive) = &mut adaptive {
+            adaptive.learn_costs(tally);
         }
         self.adaptive = adaptive;
         if let Some(apart) = &apart {
@@ -75,8 +78,11 @@ impl Bidirectional<'_> {
                 if !vertex.lobes.is_empty() {
                     rest += self.play_emitters(&vertex, &sample.sampler, clock, tally);
                     if sample.plays > 0.0 {
-                        let sampler = &sample.sampler;
-                        self.play_roulette(&vertex, sampler, clock, tally, &mut |_, value| kept += value);
+                        let (sampler, mut seconds) = (&sample.sampler, 0.0);
+                        clock.time(&mut seconds, || {
+                            self.play_roulette(&vertex, sampler, clock, tally, &mut |_, value| kept += value);
+                        });
+                        tally.playing += seconds;
                     }
                 } else {
                     rest += match self.recipe.base {
@@ -136,7 +142,7 @@ impl Bidirectional<'_> {
         clock: Clock,
         tally: &mut Tally,
     ) -> Spectrum {
-        let ((cache, subpaths), depth) = (self.picks(), vertex.walk.depth);
+        let ((cache, subpaths), depth) = (self.all(), vertex.walk.depth);
         let stored = cache.len();
         let picks = f64::from(self.settings.connections);
         let mut sum = Spectrum::ZERO;
@@ -177,9 +183,10 @@ impl Bidirectional<'_> {
         let Some(merging) = &self.techniques.merging else { return Spectrum::ZERO };
         let (depth, position) = (vertex.walk.depth, vertex.walk.vertex.point.position);
         let mut sum = Spectrum::ZERO;
-        self.bvh.within(position, merging.radius, &mut |index| {
-            if depth + self.cache.depth(index as usize) <= self.settings.max_depth {
-                let light = self.cache.load(self.world, index as usize);
+        let (cache, _) = self.all();
+        self.all_bvh().within(position, merging.radius, &mut |index| {
+            if depth + cache.depth(index as usize) <= self.settings.max_depth {
+                let light = cache.load(self.world, index as usize);
                 sum += vertex.merge(&self.techniques, merging, &light);
                 tally.merged += 1;
             }

@@ -38,7 +38,7 @@ impl Bidirectional<'_> {
         self.techniques.guide = None;
         self.plan();
         self.light_pass(Stream::GuideLight, 0, None, &|_| ());
-        self.build_tree(Stream::GuideLight, 0)?;
+        self.build_trees(Stream::GuideLight, 0)?;
         // Collected in order: sums must not depend on threads.
         let found: Vec<Vec<(u32, f64)>> = (0..eye_subpaths / CHUNK)
             .into_par_iter()

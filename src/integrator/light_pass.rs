@@ -3,10 +3,13 @@
 use super::bidirectional::Bidirectional;
 use super::recipe::Base;
 use crate::connect;
+use crate::error::Result;
 use crate::film::Film;
 use crate::light_cache::LightCache;
-use crate::sampler::{Family, Purpose, Stream};
+use crate::roulette::{MinimumRandom, Pregenerated};
+use crate::sampler::{Family, Purpose, Sampler, Stream};
 use crate::tally::Tally;
+use crate::vertex_bvh::VertexBvh;
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Instant;
@@ -18,7 +21,7 @@ const PILOT: u64 = 16 * CHUNK;
 /// Light subpaths whose vertices all are kept for uniform picks: enough for eye samples not to share many.
 const PICKED: u64 = 256 * CHUNK;
 impl Bidirectional<'_> {
-    /// How many vertices a light subpath leaves in the roulette's cache, and in that for uniform picks.
+    /// How many vertices a light subpath leaves in the roulette's cache, and in that of all.
     pub(super) fn vertices_per_subpath(&self) -> [f64; 2] {
         if !self.keeps_vertices() {
             return [0.0; 2];
@@ -28,34 +31,57 @@ impl Bidirectional<'_> {
             .map(|chunk| self.trace_light(Stream::Pilot, 0, chunk * CHUNK..(chunk + 1) * CHUNK, None).0)
             .collect();
         let mean = |which: usize| caches.iter().map(|c| c[which].len()).sum::<usize>() as f64 / PILOT as f64;
-        [mean(0), if self.picks_apart() { mean(1) } else { mean(0) }]
+        [mean(0), if self.all_apart() { mean(1) } else { mean(0) }]
     }
 
     fn keeps_vertices(&self) -> bool {
         self.recipe.base != Base::Off || self.recipe.roulette || self.recipe.merging
     }
 
-    /// Whether the cache has all light vertices, for want of any other use than picks.
-    fn stores_all(&self) -> bool {
-        !self.recipe.roulette && !self.recipe.merging
+    /// Whether picks and merging have a cache of their own, since the roulette leaves out most of what they want.
+    fn all_apart(&self) -> bool {
+        self.recipe.roulette && matches!(self.recipe.base, Base::Uniform | Base::Probabilistic)
     }
 
-    /// Whether uniform picks have a cache of their own.
-    fn picks_apart(&self) -> bool {
-        !self.stores_all() && matches!(self.recipe.base, Base::Uniform | Base::Probabilistic)
+    /// Subpaths of which that cache has the vertices.
+    fn kept_apart(&self) -> u64 {
+        match (self.all_apart(), self.recipe.merging) {
+            (false, _) => 0,
+            (true, true) => self.size.light_subpaths,
+            (true, false) => self.size.light_subpaths.min(PICKED),
+        }
     }
 
-    /// The light vertices to pick from where the roulette is off, and how many subpaths left them.
-    pub(super) fn picks(&self) -> (&LightCache, u64) {
-        if self.picks_apart() {
-            (&self.picks, self.size.light_subpaths.min(PICKED))
+    /// The light vertices to pick from where the roulette is off, and to merge with; and how many subpaths left them.
+    pub(super) fn all(&self) -> (&LightCache, u64) {
+        if self.all_apart() {
+            (&self.all, self.kept_apart())
         } else {
             (&self.cache, self.size.light_subpaths)
         }
     }
 
+    /// Makes the trees over an iteration's light vertices, and the numbers that queries share.
+    pub(super) fn build_trees(&mut self, stream: Stream, iteration: u64) -> Result<()> {
+        self.bvh.build(self.cache.positions())?;
+        if self.recipe.merging && self.all_apart() {
+            self.all_bvh.build(self.all.positions())?;
+        }
+        let shared = self.recipe.roulette && MinimumRandom::of(self.settings.minimum).is_none();
+        self.numbers = shared.then(|| {
+            let sampler = Sampler::new(self.settings.seed, iteration, stream, 0);
+            Pregenerated::new(&self.bvh, sampler.bits(0, Purpose::Roulette))
+        });
+        Ok(())
+    }
+
+    /// The tree over the vertices to merge with.
+    pub(super) fn all_bvh(&self) -> &VertexBvh {
+        if self.all_apart() { &self.all_bvh } else { &self.bvh }
+    }
+
     /// Traces light subpaths, storing their vertices and connecting them to the camera. Gives the roulette's cache and
-    /// that for uniform picks.
+    /// that of all.
     fn trace_light(
         &self,
         stream: Stream,
@@ -67,21 +93,22 @@ impl Bidirectional<'_> {
         // A path has one segment more when it is connected than when it is merged.
         let more = if self.recipe.merging { 1 } else { 2 };
         let mut tally = Tally { light_subpaths: subpaths.end - subpaths.start, ..Tally::default() };
-        let [mut cache, mut picks] = [(); 2].map(|()| LightCache::default());
+        let (thin, kept_apart) = (self.recipe.roulette, self.kept_apart());
+        let [mut cache, mut all] = [(); 2].map(|()| LightCache::default());
         for index in subpaths {
             let sampler =
                 Family::new(self.settings.seed, iteration, stream, index >> 32).member(index as u32);
-            let picked = self.picks_apart() && index < PICKED;
+            let apart = index < kept_apart;
             let mut walk = self.techniques.emit(world, &sampler);
             while let Some(light) = walk.filter(|light| light.depth < self.settings.max_depth) {
                 if !light.vertex.bsdf.is_delta() {
                     if self.keeps_vertices() && light.depth + more <= self.settings.max_depth {
-                        let stored = if self.stores_all() { 1.0 } else { self.techniques.stored(&light) };
+                        let stored = if thin { self.techniques.stored(&light) } else { 1.0 };
                         if stored == 1.0 || sampler.u1(light.depth, Purpose::Storing) < stored {
                             cache.push(&light);
                         }
-                        if picked {
-                            picks.push(&light);
+                        if apart {
+                            all.push(&light);
                         }
                     }
                     if let Some(film) = film.filter(|_| self.recipe.light_image)
@@ -90,18 +117,21 @@ impl Bidirectional<'_> {
                         && tally.connection(!world.visibility.occluded(&ray))
                     {
                         film.add(raster, value);
+                        if let Some(adaptive) = &self.adaptive {
+                            adaptive.splat(raster, value);
+                        }
                     }
                 }
                 walk = self.techniques.next_light(world, &light, &sampler);
             }
             cache.end_subpath();
-            if picked {
-                picks.end_subpath();
+            if apart {
+                all.end_subpath();
             }
         }
         tally.light_vertices = cache.len() as u64;
         tally.light_trace = start.elapsed().as_secs_f64();
-        ([cache, picks], tally)
+        ([cache, all], tally)
     }
 
     /// The light pass of an iteration: fills the caches, in the order of the subpaths.
@@ -124,11 +154,11 @@ impl Bidirectional<'_> {
             })
             .collect();
         self.cache.clear();
-        self.picks.clear();
+        self.all.clear();
         let mut tally = Tally::default();
-        for ([cache, picks], part_tally) in &parts {
+        for ([cache, all], part_tally) in &parts {
             self.cache.append(cache);
-            self.picks.append(picks);
+            self.all.append(all);
             tally.add(part_tally);
         }
         tally

@@ -5,6 +5,8 @@ pub mod recipe;
 pub mod plan;
 pub mod path;
 pub mod bidirectional;
+mod adaptive;
+mod balance;
 mod emitters;
 mod eye_pass;
 mod guiding;
@@ -14,7 +16,9 @@ mod parts;
 mod records;
 mod spread;
 mod tile;
+mod watched;
 
+pub use balance::Costs;
 pub use plan::Plan;
 pub use recipe::Recipe;
 
@@ -57,6 +61,12 @@ pub trait Integrator {
     /// From now on, eye samples of an iteration go to the pixels that need them, as those before showed. Iterations then
     /// depend on those before.
     fn adapt(&mut self) {}
+
+    /// The share of an iteration's time that its light subpaths should have, as iterations before showed; `None` while that
+    /// is not known.
+    fn light_share(&self, _costs: &Costs) -> Option<f64> {
+        None
+    }
 
     /// The next iteration should be over by then, with fewer or more eye samples than its size says, if need be; what it
     /// counts for stays as it is. Iterations then depend on the clock.

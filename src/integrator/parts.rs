@@ -24,7 +24,7 @@ impl Part {
 
 /// Parts of an eye pass that must end in time, and samples in each at least.
 pub(super) const PARTS: u32 = 8;
-pub(super) const LEAST_SAMPLES: u32 = 4;
+pub(super) const LEAST_SAMPLES: u32 = 2;
 /// Parts that are taken while there is time, over those that were to be.
 const MOST: u32 = 4;
 

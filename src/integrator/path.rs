@@ -1,8 +1,8 @@
 //! Path tracing with next-event estimation: code of its own, so that it can bear witness against the bidirectional
 //! machine.
 
+use super::adaptive::Adaptive;
 use super::parts::Part;
-use super::spread::Adaptive;
 use super::tile::{self, Sample};
 use super::{Integrator, Size};
 use crate::bsdf::Transport;

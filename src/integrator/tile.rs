@@ -1,7 +1,9 @@
 //! Pixels in square tiles, spread over threads.
 
+use super::adaptive::Adaptive;
 use super::parts::Part;
-use super::spread::{Adaptive, PixelPlan, PixelSums, Seen};
+use super::spread::PixelPlan;
+use super::watched::{PixelSums, Seen, work};
 use crate::film::Film;
 use crate::sampler::{Family, Purpose, Sampler, Stream};
 use crate::tally::{Clock, Tally};
@@ -73,9 +75,10 @@ pub(super) fn sample_film(
                             let raster = DVec2::new(x.into(), y.into()) + sampler.u2(0, Purpose::Raster);
                             let plays = plan.plays(n, offset);
                             let sample = Sample { raster, index, sampler, plays };
+                            let before = work(&tally);
                             let seen = radiance(&sample, clock, &mut tally);
                             if plans.is_some() {
-                                sums.add(&seen, plan.share);
+                                sums.add(&seen, plan.share, work(&tally) - before);
                             }
                             (raster, seen.radiance * scale)
                         });
@@ -95,7 +98,7 @@ pub(super) fn sample_film(
         parts.iter().fold(Tally::default(), |sum, (tally, _)| sum.plus(*tally)).less_parts_of_eye_trace();
     if let Some(adaptive) = adaptive {
         for (_, pixels) in &parts {
-            adaptive.learn(pixels, &tally);
+            adaptive.learn(pixels);
         }
     }
     tally

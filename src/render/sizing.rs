@@ -8,14 +8,16 @@
 
 use super::counters::machine_bytes;
 use crate::film::FilmSettings;
-use crate::integrator::{Recipe, Size};
+use crate::integrator::{Costs, Recipe, Size};
 use crate::settings::Settings;
 use crate::tally::Tally;
 
 /// Share of the time that the pilot takes, and bounds in seconds.
 const PILOT: (f64, f64, f64) = (0.04, 0.2, 10.0);
-/// Share of an iteration's time that its light side gets. On `caustic_mirror` a quarter and a half leave the same error in
-/// the caustic, a quarter less elsewhere.
+/// How many times longer than the preview, of one sample, it should be; and the share of the time that this may take.
+const TELLING: f64 = 5.0;
+const MOST_PILOT: f64 = 0.2;
+/// Share of an iteration's time that its light side gets before anything is known.
 const LIGHT: f64 = 0.3;
 /// Share of the time that is not worth another iteration.
 const REST: f64 = 0.02;
@@ -95,8 +97,14 @@ impl Sizing {
         })
     }
 
-    /// The next iteration after the last one; `None` when the time is up.
-    pub(super) fn next(&self, elapsed: f64, last: &Measured) -> Option<Next> {
+    /// The next iteration after the last one; `None` when the time is up. `share` tells how much of it the light side should
+    /// have, where that is known.
+    pub(super) fn next(
+        &self,
+        elapsed: f64,
+        last: &Measured,
+        share: &dyn Fn(&Costs) -> Option<f64>,
+    ) -> Option<Next> {
         let left = self.time - elapsed;
         if left < REST * self.time {
             return None;
@@ -104,6 +112,8 @@ impl Sizing {
         let [light, eye] = last.tally.sides;
         let took = (light + eye).max(1e-9);
         let pilot = (PILOT.0 * self.time).clamp(PILOT.1, PILOT.2);
+        // Large enough to tell the pixels' needs from, where that is not too much of the time.
+        let pilot = pilot.max((TELLING * took).min(MOST_PILOT * self.time));
         let mut seconds = if took < 0.7 * pilot { pilot.max(2.0 * took).min(left) } else { left };
         if self.open == Open::Samples {
             seconds = seconds.min((self.time / PARTS).max(pilot));
@@ -115,10 +125,11 @@ impl Sizing {
         let per_sample = (eye / f64::from(last.size.samples)).max(1e-9);
         let size = match self.open {
             Open::Both => {
+                let light = share(&Costs { seconds, per_subpath, per_sample }).unwrap_or(LIGHT);
                 let subpaths =
-                    self.most_subpaths(last).min(LIGHT * seconds / per_subpath.max(1e-12)).max(1.0);
+                    self.most_subpaths(last).min(light * seconds / per_subpath.max(1e-12)).max(1.0);
                 // In the same proportion where memory is short.
-                self.size((1.0 / LIGHT - 1.0) * subpaths * per_subpath / per_sample, subpaths)
+                self.size((1.0 / light - 1.0) * subpaths * per_subpath / per_sample, subpaths)
             }
             Open::LightSubpaths => {
                 let eye_side = per_sample * f64::from(last.size.samples);
@@ -183,7 +194,7 @@ mod tests {
             elapsed += sides[0] + sides[1];
             let bytes = (vertex_bytes * size.light_subpaths as f64) as usize;
             let last = Measured { size, tally: Tally { sides, ..Tally::default() }, bytes };
-            match sizing.next(elapsed, &last) {
+            match sizing.next(elapsed, &last, &|_| None) {
                 Some(next) => sizes.push((next.size, next.weight)),
                 None => return (sizes, elapsed),
             }

@@ -230,7 +230,7 @@ pub const TABLE: &[Setting] = &[
         heading: TRANSPORT,
         help: "Share of light vertices that are stored (+hrr) though no glossy surface threw light on them",
         doc: "Light from lamps and diffuse surfaces is found by eye subpaths as well; leaving most of it out of the cache \
-              makes room and time for caustics. 1: all are stored, as always with vertex merging.",
+              makes room and time for caustics. 1: all are stored. Vertex merging has all of them in any case.",
     },
     Setting {
         name: "emitters",

@@ -23,9 +23,9 @@ pub enum Origin {
 /// What a light vertex is used for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Role {
-    /// Kept or merged by all eye vertices.
+    /// Judged by the roulette of all eye vertices.
     Stored,
-    /// Connected to the camera.
+    /// Connected to the camera, and merged.
     Seen,
 }
 
@@ -70,7 +70,7 @@ pub struct Total {
     pub known: f64,
     /// Of those that need it stored, over the probability of that.
     pub stored: f64,
-    /// Of those that need it seen, over the probability of that.
+    /// Of those that need it seen or merged, over the probability of that.
     pub seen: f64,
 }
 

@@ -1,0 +1,112 @@
+//! What an integrator that adapts remembers, and what it makes of that.
+
+use super::Size;
+use super::balance::{Costs, Known};
+use super::spread::{PixelPlan, Spread};
+use super::watched::{PixelSums, Watched, work};
+use crate::film::{Film, FilmSettings};
+use crate::math::{Spectrum, luminance};
+use crate::tally::Tally;
+use glam::DVec2;
+
+/// Most light vertices that the roulette should keep for an eye vertex on average: the price of more is that of a query, and
+/// what they bring ever less.
+const KEPT: f64 = 4.0;
+
+/// What an integrator that adapts remembers.
+#[derive(Debug)]
+pub(super) struct Adaptive {
+    watched: Watched,
+    /// Squares of what the camera saw of light vertices in the last iteration.
+    splats: Film,
+    size: Size,
+    /// What the visit of a node costs, over all that a sample costs without the roulette; and the mean of what a sample cost,
+    /// in the same unit.
+    visit: f64,
+    sample: f64,
+    /// Factor on how many light vertices the roulette keeps.
+    kept: f64,
+    spread: Option<Spread>,
+}
+
+impl Adaptive {
+    /// Nothing so far.
+    pub fn new(film: &FilmSettings) -> Self {
+        Self {
+            watched: Watched::new(film.width, film.height),
+            splats: Film::new(film),
+            size: Size { samples: 1, light_subpaths: 1 },
+            visit: 0.0,
+            sample: 1.0,
+            kept: 1.0,
+            spread: None,
+        }
+    }
+
+    /// What a pixel gets in an iteration of `samples`.
+    pub fn pixel(&self, x: u32, y: u32, samples: u32) -> PixelPlan {
+        self.spread.as_ref().map_or(PixelPlan { samples, share: 1.0 }, |spread| spread.pixel(x, y))
+    }
+
+    /// Factor on how many light vertices the roulette should keep.
+    pub fn kept(&self) -> f64 {
+        self.kept
+    }
+
+    /// Forgets the light side of the last iteration, for one of this size.
+    pub fn begin(&mut self, film: &FilmSettings, size: Size) {
+        (self.splats, self.size) = (Film::new(film), size);
+    }
+
+    /// Learns that the camera saw a light vertex. From any thread.
+    pub fn splat(&self, raster: DVec2, value: Spectrum) {
+        self.splats.add(raster, value * value);
+    }
+
+    /// Learns from a part of an iteration's eye samples.
+    pub fn learn(&mut self, pixels: &[(u32, u32, PixelSums)]) {
+        for (x, y, sums) in pixels {
+            self.watched.add(*x, *y, sums);
+        }
+    }
+
+    /// Learns what all parts cost.
+    pub fn learn_costs(&mut self, tally: &Tally) {
+        let all = tally.eye_trace + tally.roulette_seconds + tally.visibility;
+        // What is timed in some places only may seem to be more than all.
+        let rest = (all - tally.playing).max(0.1 * all).max(1e-9);
+        self.sample = all / rest;
+        let rays = tally.camera_rays.max(1) as f64;
+        self.visit = tally.playing / rest * rays / work(tally).max(1.0);
+    }
+
+    /// Learns how many light vertices the roulette kept.
+    pub fn moderate(&mut self, tally: &Tally) {
+        let [queries, accepted] = [tally.roulette.queries, tally.roulette.accepted].map(|n| n as f64);
+        self.kept *= (KEPT * queries / accepted.max(1.0)).min(1.0);
+    }
+
+    /// Plans iterations to come.
+    pub fn plan(&mut self, samples: u32) {
+        self.spread = self.watched.plan(samples, self.visit);
+    }
+
+    /// The share of an iteration's time that its light side should have; `None` while too little is known.
+    pub fn light_share(&self, costs: &Costs) -> Option<f64> {
+        let needs = self.watched.needs()?;
+        let samples = f64::from(self.size.samples);
+        let splats: Vec<f64> = (0..self.splats.height())
+            .flat_map(|y| self.splats.row(y))
+            .map(|squares| luminance(squares) / (samples * samples))
+            .collect();
+        let known = Known {
+            needs: &needs,
+            splats: &splats,
+            width: self.watched.width,
+            light_subpaths: self.size.light_subpaths as f64,
+            visit: self.visit,
+            sample: self.sample,
+        };
+        known.light_share(costs)
+    }
+}
