@@ -1,4 +1,5 @@
-//! Scenes whose radiance is known, by every integrator and every backend.
+//! Scenes whose radiance is known, by every integrator with the best backend and some with the others; by all with all:
+//! `cargo test -- --ignored closed_form`.
 
 use crate::support::estimate::estimate;
 use crate::support::scenes::{cube, in_memory, quad};
@@ -28,12 +29,33 @@ fn assert_radiance(name: &str, scene: &Scene, settings: &Settings, radiance: f64
     );
 }
 
-/// Every integrator but those of `without`, with every backend.
-fn check(name: &str, scene: &Scene, settings: &Settings, without: &[Integrator], radiance: f64) {
+/// How much is rendered.
+#[derive(Clone, Copy, PartialEq)]
+enum Extent {
+    /// Every integrator with the best backend, these with the others.
+    Quick,
+    /// Every integrator with every backend.
+    Full,
+}
+
+const WITH_OTHERS: [Integrator; 3] = [Integrator::Pt, Integrator::LvcHrr, Integrator::PcvcmHrr];
+
+/// Every integrator but those of `without`.
+fn check(
+    extent: Extent,
+    name: &str,
+    scene: &Scene,
+    settings: &Settings,
+    without: &[Integrator],
+    radiance: f64,
+) {
     for visibility in Backend::ALL {
         if cfg!(feature = "embree") || visibility != Backend::Embree {
             for integrator in Integrator::ALL {
-                if integrator != Integrator::Auto && !without.contains(&integrator) {
+                let wanted = extent == Extent::Full
+                    || visibility == Backend::BEST
+                    || WITH_OTHERS.contains(&integrator);
+                if wanted && integrator != Integrator::Auto && !without.contains(&integrator) {
                     let settings = Settings { integrator, visibility, ..settings.clone() };
                     assert_radiance(name, scene, &settings, radiance);
                 }
@@ -75,8 +97,7 @@ fn diffuse(albedo: f64) -> Scattering {
 }
 
 /// Walls that all emit 1 and reflect one half, diffuse ones and a mirror: everything has radiance 1 + 1/2 + 1/4 ...
-#[test]
-fn a_furnace_is_evenly_bright() {
+fn furnace(extent: Extent) {
     let mirror = Scattering::Mirror { reflectance: Spectrum::splat(0.5) };
     for (name, left) in [("diffuse furnace", diffuse(0.5)), ("furnace with a mirror", mirror)] {
         let materials = vec![lit("wall", diffuse(0.5), 1.0), lit("left", left, 1.0)];
@@ -84,20 +105,19 @@ fn a_furnace_is_evenly_bright() {
         let settings = Settings { iterations: 64, samples: 64, merge_radius: 0.01, ..Settings::default() };
         // What comes by way of the mirror, light tracing does not see.
         let without = if name == "diffuse furnace" { &[][..] } else { &[Integrator::Lt] };
-        check(name, &small(scene), &settings, without, 2.0);
+        check(extent, name, &small(scene), &settings, without, 2.0);
     }
 }
 
 /// A convex thing in surroundings of radiance 1 shows its albedo.
-#[test]
-fn even_surroundings_show_the_albedo() {
+fn even_surroundings(extent: Extent) {
     let materials = vec![lit("sky", diffuse(0.0), 1.0), Material::diffuse("thing", Spectrum::splat(0.6))];
     let mut mesh = room([0, 0]);
     cube(&mut mesh, 0.3, Vec3::ZERO, 1);
     let scene = small(in_memory(mesh, materials, DVec3::new(0.2, 0.1, 0.9), DVec3::ZERO, 8.0));
     let settings = Settings { iterations: 64, samples: 256, ..Settings::default() };
     // What is seen under 8 degrees, too few light subpaths meet.
-    check("surroundings", &scene, &settings, &[Integrator::Lt], 0.6);
+    check(extent, "surroundings", &scene, &settings, &[Integrator::Lt], 0.6);
 }
 
 /// Form factor of a rectangle of sides a, b at distance 1, from below one of its corners [Howell, B-3].
@@ -114,26 +134,24 @@ fn plates(mesh: &mut Mesh, materials: &mut Vec<Material>) -> f64 {
     0.7 * 4.0 * corner(0.5, 0.5)
 }
 
-#[test]
-fn a_lamp_over_a_plate_has_its_form_factor() {
+fn lamp_over_a_plate(extent: Extent) {
     let (mut mesh, mut materials) = (Mesh::default(), Vec::new());
     let radiance = plates(&mut mesh, &mut materials);
     let mut scene = small(in_memory(mesh, materials, DVec3::new(2.0, 0.6, 0.0), DVec3::ZERO, 0.2));
     let settings = Settings { iterations: 64, samples: 16, ..Settings::default() };
-    check("plates", &scene, &settings, &[Integrator::Lt], radiance);
+    check(extent, "plates", &scene, &settings, &[Integrator::Lt], radiance);
     // Half of a lamp gives half of the light; a veil that stops a third takes a third of it.
     scene.materials[1].opacity = 0.5;
     scene.materials.push(Material::diffuse("veil", Spectrum::ZERO));
     scene.materials[2].opacity = 1.0 / 3.0;
     quad(&mut scene.mesh, [[-1, 0, -1], [1, 0, -1], [1, 0, 1], [-1, 0, 1]], 1.5, Vec3::Y * 0.95, 2);
     let settings = Settings { iterations: 64, samples: 64, ..Settings::default() };
-    check("half a lamp behind a veil", &scene, &settings, &[Integrator::Lt], radiance / 3.0);
+    check(extent, "half a lamp behind a veil", &scene, &settings, &[Integrator::Lt], radiance / 3.0);
 }
 
 /// The same plate, seen in a mirror that also throws the lamp's image on it: light by way of the mirror arrives as if
 /// from a second lamp behind it.
-#[test]
-fn a_mirror_shows_the_plate_and_the_lamps_second_light() {
+fn plate_in_a_mirror(extent: Extent) {
     for (name, alpha) in [("smooth mirror", 0.0), ("mirror of alpha 1e-4", 1e-4)] {
         let (mut mesh, mut materials) = (Mesh::default(), Vec::new());
         let direct = plates(&mut mesh, &mut materials);
@@ -147,7 +165,7 @@ fn a_mirror_shows_the_plate_and_the_lamps_second_light() {
             small(in_memory(mesh, materials, DVec3::new(1.0, 0.8, 0.0), DVec3::new(-3.0, 0.0, 0.0), 0.2));
         let settings =
             Settings { iterations: 96, samples: 64, light_subpaths: 20_000, ..Settings::default() };
-        check(name, &scene, &settings, &[Integrator::Lt], direct + second);
+        check(extent, name, &scene, &settings, &[Integrator::Lt], direct + second);
     }
 }
 
@@ -162,8 +180,7 @@ fn plate(lights: Vec<LightSource>) -> Scene {
 }
 
 /// Lamps at (0.3, 0.4, 0), half a metre from the plate's middle, and parallel light from there, all at a cosine of 0.8.
-#[test]
-fn lamps_without_size_light_a_plate() {
+fn lamps_without_size(extent: Extent) {
     let position = DVec3::new(0.3, 0.4, 0.0);
     let direction = -position.normalize();
     let intensity = Spectrum::splat(2.0);
@@ -182,7 +199,7 @@ fn lamps_without_size_light_a_plate() {
         ),
         ("sun", LightSource::Directional { direction, irradiance: intensity }, 0.7 * FRAC_1_PI * 2.0 * 0.8),
     ] {
-        check(name, &plate(vec![light]), &settings, &[Integrator::Lt], radiance);
+        check(extent, name, &plate(vec![light]), &settings, &[Integrator::Lt], radiance);
     }
     // And together.
     let all = vec![
@@ -198,8 +215,7 @@ fn lamps_without_size_light_a_plate() {
 }
 
 /// In a sky of radiance 1 a convex thing shows its albedo, and clear glass shows the sky.
-#[test]
-fn an_even_sky_shows_the_albedo_and_fills_glass() {
+fn even_sky(extent: Extent) {
     let glass = Scattering::Dielectric { ior: 1.5, alpha_x: 0.0, alpha_y: 0.0 };
     let thing =
         [(Material::diffuse("thing", Spectrum::splat(0.6)), 0.6), (Material::new("thing", glass), 1.0)];
@@ -209,11 +225,49 @@ fn an_even_sky_shows_the_albedo_and_fills_glass() {
         let mut scene = small(in_memory(mesh, vec![material], DVec3::new(0.2, 0.1, 0.9), DVec3::ZERO, 8.0));
         scene.lights = vec![LightSource::Environment { color: Spectrum::ONE, image: None }];
         let settings = Settings { iterations: 64, samples: 64, merge_radius: 1e-4, ..Settings::default() };
-        check("sky", &scene, &settings, &[Integrator::Lt], radiance);
+        check(extent, "sky", &scene, &settings, &[Integrator::Lt], radiance);
         // Seen from aside of the thing, the sky is itself.
         scene.camera.target = DVec3::new(0.2, 2.0, 0.9);
         scene.camera.up = DVec3::X;
         let settings = Settings { iterations: 4, ..settings };
-        check("the sky itself", &scene, &settings, &[], 1.0);
+        check(extent, "the sky itself", &scene, &settings, &[], 1.0);
     }
+}
+
+#[test]
+fn a_furnace_is_evenly_bright() {
+    furnace(Extent::Quick);
+}
+
+#[test]
+fn even_surroundings_show_the_albedo() {
+    even_surroundings(Extent::Quick);
+}
+
+#[test]
+fn a_lamp_over_a_plate_has_its_form_factor() {
+    lamp_over_a_plate(Extent::Quick);
+}
+
+#[test]
+fn a_mirror_shows_the_plate_and_the_lamps_second_light() {
+    plate_in_a_mirror(Extent::Quick);
+}
+
+#[test]
+fn lamps_without_size_light_a_plate() {
+    lamps_without_size(Extent::Quick);
+}
+
+#[test]
+fn an_even_sky_shows_the_albedo_and_fills_glass() {
+    even_sky(Extent::Quick);
+}
+
+#[test]
+#[ignore = "several minutes"]
+fn every_integrator_with_every_backend() {
+    let scenes =
+        [furnace, even_surroundings, lamp_over_a_plate, plate_in_a_mirror, lamps_without_size, even_sky];
+    scenes.into_iter().for_each(|scene| scene(Extent::Full));
 }

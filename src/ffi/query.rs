@@ -191,6 +191,34 @@ pub(super) unsafe fn run(
     Ok(())
 }
 
+/// What the calls for one query have in common.
+struct Asked<'a> {
+    cache: &'a HrrCache,
+    ask: HrrQuery,
+    options: Options,
+    counters: Option<Out<HrrCounters>>,
+}
+
+impl Asked<'_> {
+    #[inline(always)]
+    unsafe fn read(
+        cache: *const HrrCache,
+        query: *const HrrQuery,
+        options: *const HrrQueryOptions,
+        counters: *mut HrrCounters,
+    ) -> Outcome<Self> {
+        // SAFETY: passed on.
+        unsafe {
+            Ok(Self {
+                cache: pointer::object(cache, "cache")?,
+                ask: pointer::copy(query, "query")?,
+                options: Options::read(options)?,
+                counters: Out::optional(counters, "counters")?,
+            })
+        }
+    }
+}
+
 /// The room that a host has for hits, and how many there are.
 pub(super) struct Hits {
     room: Option<Out<HrrHit>>,
@@ -257,12 +285,9 @@ pub unsafe extern "C" fn hrr_query(
         let mut did = QueryCounters::default();
         // SAFETY: this module's contract.
         unsafe {
-            let cache = pointer::object(cache, "cache")?;
-            let ask = pointer::copy(query, "query")?;
-            let options = Options::read(options)?;
+            let Asked { cache, ask, options, counters } = Asked::read(cache, query, options, counters)?;
             let mut hits = Hits::new(hits, capacity)?;
             let out_count = Out::new(out_count, "out_count")?;
-            let counters = Out::optional(counters, "counters")?;
             run(cache, ask, options, &mut did, |hit| hits.push(hit))?;
             add(counters, &did);
             hits.finish(out_count)
@@ -288,11 +313,8 @@ pub unsafe extern "C" fn hrr_query_visit(
         let mut did = QueryCounters::default();
         // SAFETY: this module's contract.
         unsafe {
-            let cache = pointer::object(cache, "cache")?;
-            let ask = pointer::copy(query, "query")?;
-            let options = Options::read(options)?;
+            let Asked { cache, ask, options, counters } = Asked::read(cache, query, options, counters)?;
             let visit = visit.ok_or_else(|| Failure::argument("visit is NULL"))?;
-            let counters = Out::optional(counters, "counters")?;
             let mut answer = 0;
             run(cache, ask, options, &mut did, |hit| {
                 if answer == 0 {

@@ -56,6 +56,8 @@ pub struct Bidirectional<'a> {
 impl<'a> Bidirectional<'a> {
     /// Prepares a recipe: a pre-pass over light subpaths sets the constants of roulette and weights.
     pub fn new(world: &'a World<'a>, settings: &'a Settings, recipe: Recipe) -> Result<Self> {
+        // Without a surface to play at, the roulette is not there at all.
+        let recipe = Recipe { roulette: recipe.roulette && plays_somewhere(world.scene, settings), ..recipe };
         let mut machine = Self {
             world,
             settings,
@@ -76,13 +78,6 @@ impl<'a> Bidirectional<'a> {
         };
         machine.resize(Size::of(settings, &world.scene.film))?;
         Ok(machine)
-    }
-
-    /// Whether no surface has lobes for the roulette, anywhere on it.
-    fn nothing_glossy(&self) -> bool {
-        let Scene { materials, mesh, .. } = self.world.scene;
-        let open: Vec<bool> = materials.iter().map(|m| Lobes::of(m, self.settings.hrr_alpha).open).collect();
-        !mesh.materials.iter().any(|&m| open[m as usize])
     }
 
     /// Sets how often each technique tries, per eye sample.
@@ -131,6 +126,12 @@ impl<'a> Bidirectional<'a> {
     }
 }
 
+/// Whether any surface has lobes for the roulette, anywhere on it.
+fn plays_somewhere(scene: &Scene, settings: &Settings) -> bool {
+    let open: Vec<bool> = scene.materials.iter().map(|m| Lobes::of(m, settings.hrr_alpha).open).collect();
+    scene.mesh.materials.iter().any(|&m| open[m as usize])
+}
+
 impl Integrator for Bidirectional<'_> {
     fn resize(&mut self, size: Size) -> Result<()> {
         let film = &self.world.scene.film;
@@ -139,7 +140,7 @@ impl Integrator for Bidirectional<'_> {
             light_subpaths: if self.recipe.base == Base::OwnPath { all } else { size.light_subpaths },
             ..size
         };
-        if self.recipe.roulette && self.settings.guiding == Switch::On && !self.nothing_glossy() {
+        if self.recipe.roulette && self.settings.guiding == Switch::On {
             self.learn_guide()?;
         }
         self.plan();

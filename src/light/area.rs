@@ -1,6 +1,7 @@
 //! Emitting triangles: a point is picked with probability proportional to power, uniformly over the area; directions
 //! follow the cosine law. Next-event estimation and emission use the same density of points.
 
+use super::joined;
 use crate::geometry::{Mesh, SurfacePoint};
 use crate::material::Material;
 use crate::math::{Discrete, Frame, Spectrum, luminance, warp};
@@ -120,9 +121,13 @@ impl AreaLights {
         self.emitters.iter_mut().for_each(|e| e.pdf_a *= share);
     }
 
-    /// The sum of the squares of the triangles' shares of their light.
+    /// The sum of the squares of their lamps' shares of the light; triangles that touch are one lamp.
     pub(super) fn concentration(&self) -> f64 {
-        (0..self.pick.len()).map(|i| self.pick.probability(i).powi(2)).sum()
+        let mut shares = vec![0.0; self.emitters.len()];
+        for (i, lamp) in joined::lamps(self.emitters.iter().map(|e| e.corners)).into_iter().enumerate() {
+            shares[lamp] += self.pick.probability(i);
+        }
+        shares.iter().map(|share| share * share).sum()
     }
 
     /// Number of emitting triangles.

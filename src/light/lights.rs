@@ -108,8 +108,8 @@ impl Lights {
         self.area.len() + self.others.len()
     }
 
-    /// How many lights of equal power the emitting triangles, point and spot lights amount to: the square of the sum of
-    /// their powers over the sum of the squares; 0 where there are none.
+    /// How many lights of equal power the lamps of emitting triangles (those that touch are one), point and spot lights amount
+    /// to: the square of the sum of their powers over the sum of the squares; 0 where there are none.
     pub fn near_count(&self) -> f64 {
         let lamps = (0..self.others.len()).filter(|&i| matches!(self.others[i], Other::Lamp(_)));
         let (mut sum, mut squares) = (self.area_share, self.area_share.powi(2) * self.area.concentration());

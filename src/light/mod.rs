@@ -1,6 +1,7 @@
 //! Lights: choosing one, points and directions on it, and the densities of both.
 
 pub mod source;
+mod joined;
 pub mod area;
 pub mod lamp;
 pub mod distant;

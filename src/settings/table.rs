@@ -87,8 +87,8 @@ pub const TABLE: &[Setting] = &[
         value_name: "N",
         heading: TRANSPORT,
         help: "Light subpaths in each iteration; 0: what suits",
-        doc: "0: with --time and the roulette (+hrr), as many as take as long as the eye samples and fit the memory; else \
-              as many as eye samples.",
+        doc: "0: with --time and the roulette (+hrr), as many as take as long as the eye samples and fit the \
+              memory; else as many as eye samples.",
     },
     Setting {
         name: "connections",
@@ -126,7 +126,11 @@ pub const TABLE: &[Setting] = &[
         value_name: "X",
         heading: TRANSPORT,
         help: "Most that the roulette's (+hrr) probability may be on the axis of a lobe, in place of 'expected'",
-        doc: "Before the minimum with 1, at the distance sqrt(A / 4 pi), A the scene's surface area. Where it holds, about               X N alpha^2 of N light vertices are kept at a surface of GGX roughness alpha that absorbs nothing, and               2 sqrt(X) - 1 times as many as at X = 1 where X is over 1. The least of this and of 'expected' counts: where               'expected' asks for more than a narrow lobe can use, this saves the time; a large 'expected' leaves it to X               alone. 1 to 4 keep nearly all that is useful.",
+        doc: "Before the minimum with 1, at the distance sqrt(A / 4 pi), A the scene's surface area. Where it \
+              holds, about X N alpha^2 of N light vertices are kept at a surface of GGX roughness alpha that \
+              absorbs nothing, and 2 sqrt(X) - 1 times as many as at X = 1 where X is over 1. The least of this \
+              and of 'expected' counts: where 'expected' asks for more than a narrow lobe can use, this saves \
+              the time; a large 'expected' leaves it to X alone. 1 to 4 keep nearly all that is useful.",
     },
     Setting {
         name: "hrr_alpha",
@@ -149,9 +153,9 @@ pub const TABLE: &[Setting] = &[
         value_name: "NAME",
         heading: TRANSPORT,
         help: "Shape of the range in which the roulette (+hrr) keeps light vertices",
-        doc: "ellipsoid: as the lobe of the surface is. spheroid: round about the axis, as wide as the lobe's wider side. \
-              sphere: the same in all directions. All keep about as many light vertices for a value of expected; the \
-              simpler ones, for comparison, keep the wrong ones more often.",
+        doc: "ellipsoid: as the lobe of the surface is. spheroid: round about the axis, as wide as the lobe's \
+              wider side. sphere: the same in all directions. All keep about as many light vertices for a value \
+              of expected; the simpler ones, for comparison, keep the wrong ones more often.",
     },
     Setting {
         name: "minimum",
@@ -165,9 +169,10 @@ pub const TABLE: &[Setting] = &[
         value_name: "NAME",
         heading: TRANSPORT,
         help: "Where the roulette (+hrr) has its random numbers from, whose minimum below a node it must know",
-        doc: "nested: dealt on the way down, children of a node in a stratum each. semi-stratified: the paper's rule. \
-              exact: the true minimum of independent numbers. pregenerated: one number for each light vertex and \
-              iteration, shared by all queries, as in stochastic light culling. The last three are for comparison.",
+        doc: "nested: dealt on the way down, children of a node in a stratum each. semi-stratified: the paper's \
+              rule. exact: the true minimum of independent numbers. pregenerated: one number for each light \
+              vertex and iteration, shared by all queries, as in stochastic light culling. The last three are \
+              for comparison.",
     },
     Setting {
         name: "lobe_precision",
@@ -181,8 +186,9 @@ pub const TABLE: &[Setting] = &[
         value_name: "NAME",
         heading: TRANSPORT,
         help: "Arithmetic in which the roulette (+hrr) computes probabilities",
-        doc: "f64: double precision. rebased: the offset between the two vertices in double precision, the rest in single. f32: \
-              single precision throughout. The last two are for comparison: in narrow lobes they bias the image.",
+        doc: "f64: double precision. rebased: the offset between the two vertices in double precision, the rest \
+              in single. f32: single precision throughout. The last two are for comparison: in narrow lobes they \
+              bias the image.",
     },
     Setting {
         name: "lobe_widening",
@@ -205,8 +211,8 @@ pub const TABLE: &[Setting] = &[
         value_name: "SHARE",
         heading: TRANSPORT,
         help: "Share of a lobe's light vertices that the roulette (+hrr) also keeps from all directions",
-        doc: "A floor under the lobe for what its model misses of the surface's tails: fewer bright spots, more vertices. Not \
-              at surfaces that transmit.",
+        doc: "A floor under the lobe for what its model misses of the surface's tails: fewer bright spots, more \
+              vertices. Not at surfaces that transmit.",
     },
     Setting {
         name: "node_padding",
@@ -229,8 +235,9 @@ pub const TABLE: &[Setting] = &[
         value_name: "SHARE",
         heading: TRANSPORT,
         help: "Share of light vertices that are stored (+hrr) though no glossy surface threw light on them",
-        doc: "Light from lamps and diffuse surfaces is found by eye subpaths as well; leaving most of it out of the cache \
-              makes room and time for caustics. 1: all are stored. Vertex merging has all of them in any case.",
+        doc: "Light from lamps and diffuse surfaces is found by eye subpaths as well; leaving most of it out of \
+              the cache makes room and time for caustics. 1: all are stored. Vertex merging has all of them in \
+              any case.",
     },
     Setting {
         name: "emitters",
@@ -244,7 +251,10 @@ pub const TABLE: &[Setting] = &[
         value_name: "NAME",
         heading: TRANSPORT,
         help: "Whether the roulette (+hrr) judges points of lights as well",
-        doc: "For many lights, or small ones, that glossy surfaces show: next-event estimation alone seldom tries the one               that a lobe points at. Of the points 'expected' are kept on average. auto: where all emitting triangles, point               and spot lights amount to at least 16 of equal power.",
+        doc: "For many lights, or small ones, that glossy surfaces show: next-event estimation alone seldom \
+              tries the one that a lobe points at. Of the points 'expected' are kept on average. auto: where all \
+              lamps of emitting triangles (those that touch are one), point and spot lights amount to at least \
+              16 of equal power.",
     },
     Setting {
         name: "guiding",
@@ -258,8 +268,8 @@ pub const TABLE: &[Setting] = &[
         value_name: "NAME",
         heading: TRANSPORT,
         help: "Whether emitters send light (+hrr) where a pre-pass found it useful",
-        doc: "on: towards what reaches the image by way of surfaces where the roulette plays; three directions of ten \
-              stay as they are without. off: by the cosine alone.",
+        doc: "on: towards what reaches the image by way of surfaces where the roulette plays; three directions \
+              of ten stay as they are without. off: by the cosine alone.",
     },
     Setting {
         name: "adaptive",
@@ -273,8 +283,10 @@ pub const TABLE: &[Setting] = &[
         value_name: "NAME",
         heading: TRANSPORT,
         help: "Whether noisy pixels get more of the eye samples (--time without --samples)",
-        doc: "on: samples, and the roulette's queries, go where earlier iterations showed that they lower the relative \
-              error most. off: to all pixels alike.",
+        doc: "on: samples, and the roulette's queries, go where earlier iterations showed that they lower the \
+              relative error most; light subpaths get the share of the time that does so, and 'expected' is \
+              lowered where more than 4 light vertices were kept on average. off: to all pixels alike, and three \
+              tenths of the time.",
     },
     Setting {
         name: "mis",
@@ -288,8 +300,8 @@ pub const TABLE: &[Setting] = &[
         value_name: "NAME",
         heading: TRANSPORT,
         help: "How techniques that find the same path share its weight",
-        doc: "balance: in proportion to their densities. power: to the squares of these, which leaves more to the best \
-              one.",
+        doc: "balance: in proportion to their densities. power: to the squares of these, which leaves more to \
+              the best one.",
     },
     Setting {
         name: "reused_subpaths",
@@ -303,7 +315,8 @@ pub const TABLE: &[Setting] = &[
         value_name: "N",
         heading: TRANSPORT,
         help: "Light subpaths that probabilistic connections (pcbpt) choose from",
-        doc: "Each iteration takes 4 bytes and a shadow ray for each pair of an importance record and a vertex of them.",
+        doc: "Each iteration takes 4 bytes and a shadow ray for each pair of an importance record and a vertex \
+              of them.",
     },
     Setting {
         name: "record_spacing",
@@ -359,8 +372,8 @@ pub const TABLE: &[Setting] = &[
         value_name: "ALPHA",
         heading: TRANSPORT,
         help: "How slowly the radius of vertex merging shrinks; 1: not at all",
-        doc: "Iteration i has the first one's radius times (i + 1)^((ALPHA - 1) / 2). The image converges to the right \
-              one for values under 1; with 1 it stays blurred.",
+        doc: "Iteration i has the first one's radius times (i + 1)^((ALPHA - 1) / 2). The image converges to the \
+              right one for values under 1; with 1 it stays blurred.",
     },
     Setting {
         name: "iterations",
@@ -395,10 +408,11 @@ pub const TABLE: &[Setting] = &[
         value_name: "ERROR",
         heading: BUDGET,
         help: "Relative error to reach, instead of a number of iterations",
-        doc: "Of all pixels but the worst thousandth, the root of the mean of d^2 / (t^2 + eps^2): d a pixel's error, t the \
-              mean luminance of the 16 x 16 pixels around it, eps a hundredth of the image's. It is told from how the \
-              iterations differ, and the render stops when it is below ERROR with 90 % confidence, or when --time is up. \
-              It tells noise: neither the blur of vertex merging nor light that no iteration has found yet.",
+        doc: "Of all pixels but the worst thousandth, the root of the mean of d^2 / (t^2 + eps^2): d a pixel's \
+              error, t the mean luminance of the 16 x 16 pixels around it, eps a hundredth of the image's. It is \
+              told from how the iterations differ, and the render stops when it is below ERROR with 90 % \
+              confidence, or when --time is up. It tells noise: neither the blur of vertex merging nor light \
+              that no iteration has found yet.",
     },
     Setting {
         name: "memory",

@@ -34,7 +34,8 @@ pub struct Errors {
     pub mse: f64,
     /// The same of the region's pixels; NaN where there is none.
     pub region_mse: f64,
-    /// Mean square error relative to a pixel's surroundings, without the worst thousandth.
+    /// Mean square error relative to a pixel's surroundings, without the worst thousandth of the pixels, nor that of the
+    /// reference's.
     pub trimmed: f64,
 }
 
@@ -44,6 +45,8 @@ pub struct Yardstick<'a> {
     mean: Image,
     /// Square errors of the mean itself.
     noise: Vec<DVec3>,
+    /// Noise of a pixel of the reference beyond which relative errors leave it out: that of its worst thousandth.
+    noisiest: f64,
     /// Images that are part of the mean, if the runs are.
     own: Option<usize>,
 }
@@ -55,7 +58,7 @@ impl<'a> Yardstick<'a> {
             reference.map_or_else(|| runs.iter().map(|r| &r.image).collect(), |r| r.iter().collect());
         let mean = mean(images.iter().copied());
         let n = images.len() as f64;
-        let noise = (0..mean.pixels.len())
+        let noise: Vec<DVec3> = (0..mean.pixels.len())
             .map(|i| {
                 let square = |image: &&Image| {
                     let d = (image.pixels[i] - mean.pixels[i]).as_dvec3();
@@ -64,7 +67,13 @@ impl<'a> Yardstick<'a> {
                 images.iter().map(square).sum::<DVec3>() / (n * (n - 1.0))
             })
             .collect();
-        Self { region, mean, noise, own: reference.is_none().then_some(runs.len()) }
+        let mut sums: Vec<f64> = noise.iter().map(|n| n.element_sum()).collect();
+        let kept = sums.len() - 1 - (TRIMMED * sums.len() as f64) as usize;
+        let noisiest = match reference {
+            Some(_) => *sums.select_nth_unstable_by(kept, f64::total_cmp).1,
+            None => f64::INFINITY,
+        };
+        Self { region, mean, noise, noisiest, own: reference.is_none().then_some(runs.len()) }
     }
 
     /// The square error of a pixel, as well as it can be told.
@@ -92,8 +101,10 @@ impl<'a> Yardstick<'a> {
         let all = image.pixels.len();
         let eps = floor((0..all as u32).map(at).sum::<f64>() / all as f64);
         let tile = |i: usize| tiles[grid.of(i as u32 % image.width, i as u32 / image.width)];
-        let mut relative: Vec<f64> =
-            (0..all).map(|i| local_square(self.square(image, i), tile(i), eps)).collect();
+        let mut relative: Vec<f64> = (0..all)
+            .filter(|&i| self.noise[i].element_sum() <= self.noisiest)
+            .map(|i| local_square(self.square(image, i), tile(i), eps))
+            .collect();
         Errors {
             mean: image.pixels.iter().map(|p| luminance(p.as_dvec3())).sum::<f64>() / all as f64,
             mse: mean_of(&mut (0..all)),

@@ -47,17 +47,24 @@ pub fn of(study: &str, size: [u32; 2]) -> Option<(Vec<Variant>, Vec<Recipe>)> {
         // Caustics reflected in brushed metal of roughness 1e-4 and 1e-2.
         "brushed" => (vec![judged(load("brushed_funnel"), "steel")], vec![PCBPT, PCBPT_HRR, PCBPT_SPHEROID]),
         // What the roulette costs beside merging.
-        "merging" => (vec![variant(load("mirror_room"), "mirror")], vec![PCVCM, PCVCM_HRR]),
+        "merging" => {
+            (["mirror_room", "cornell"].map(|s| variant(load(s), "mirror")).into(), vec![PCVCM, PCVCM_HRR])
+        }
         // Where the roulette has little to gain, or nothing.
         "graceful" => (graceful(size), vec![LVC, LVC_HRR]),
+        // The same beside probabilistic connections.
+        "graceful_pc" => (graceful(size), vec![PCBPT, PCBPT_HRR]),
         // How errors fall with time.
         "convergence" => {
-            let times = [0.125, 0.25, 0.5, 1.0].map(|time| Variant {
-                name: format!("caustic_mirror x{time}"),
-                time,
-                ..variant(load("caustic_mirror"), "mirror")
+            let scenes = ["caustic_mirror", "cornell"];
+            let times = scenes.iter().flat_map(|scene| {
+                [0.125, 0.25, 0.5, 1.0].map(|time| Variant {
+                    name: format!("{scene} x{time}"),
+                    time,
+                    ..variant(load(scene), "mirror")
+                })
             });
-            (times.into(), vec![PT, LVC, PCBPT, LVC_HRR, PCBPT_HRR])
+            (times.collect(), vec![PT, LVC, PCBPT, LVC_HRR, PCBPT_HRR])
         }
         _ => return None,
     })
@@ -73,12 +80,12 @@ fn graceful(size: [u32; 2]) -> Vec<Variant> {
         "brushed_funnel",
         "glossy_corridor",
     ];
-    let mut variants: Vec<Variant> = plain.iter().map(|name| variant(load(name, size), "mirror")).collect();
+    let mut variants: Vec<Variant> = plain.iter().map(|name| judged(load(name, size), "mirror")).collect();
     let mut change = |name: &str, scene: &str, change: fn(&mut Scene)| {
         let mut scene = load(scene, size);
         change(&mut scene);
         let name = name.to_owned();
-        variants.push(Variant { name, ..variant(scene, "") });
+        variants.push(Variant { name, ..judged(scene, "") });
     };
     change("grazing_rough", "glossy_corridor", |scene| roughen(scene, "metal", 0.25, 0.25));
     change("diagonal", "caustic_mirror_aniso", |scene| {
