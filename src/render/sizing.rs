@@ -112,8 +112,10 @@ impl Sizing {
         let [light, eye] = last.tally.sides;
         let took = (light + eye).max(1e-9);
         let pilot = (PILOT.0 * self.time).clamp(PILOT.1, PILOT.2);
-        // Large enough to tell the pixels' needs from, where that is not too much of the time.
-        let pilot = pilot.max((TELLING * took).min(MOST_PILOT * self.time));
+        // After the preview, large enough to tell the pixels' needs from, where that is not too much of the time.
+        let previewed = last.size.samples == self.preview.samples && self.open != Open::LightSubpaths;
+        let telling = if previewed { (TELLING * took).min(MOST_PILOT * self.time) } else { 0.0 };
+        let pilot = pilot.max(telling);
         let mut seconds = if took < 0.7 * pilot { pilot.max(2.0 * took).min(left) } else { left };
         if self.open == Open::Samples {
             seconds = seconds.min((self.time / PARTS).max(pilot));
