@@ -114,7 +114,7 @@ impl Default for Settings {
             connections: 1,
             expected: 1.0,
             axis_probability: None,
-            hrr_alpha: 0.1,
+            hrr_alpha: 0.3,
             range: Range::Ellipsoid,
             minimum: MinimumRule::Nested,
             lobe_precision: LobePrecision::F64,

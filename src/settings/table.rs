@@ -135,12 +135,12 @@ pub const TABLE: &[Setting] = &[
     Setting {
         name: "hrr_alpha",
         kind: Kind::Real { min: 0.0, max: 1.0, get: |s| Some(s.hrr_alpha), set: |s, v| s.hrr_alpha = v },
-        default: "0.1",
+        default: "0.3",
         value_name: "ALPHA",
         heading: TRANSPORT,
         help: "Largest GGX roughness at which the roulette is used",
-        doc: "Wider lobes, seen at grazing angles above all, are served better by scattering and by next-event \
-              estimation.",
+        doc: "Where wide lobes are seen at grazing angles, 0.1 is better: scattering and next-event estimation serve \
+              them as well, without the time of the roulette.",
     },
     Setting {
         name: "range",
