@@ -25,7 +25,7 @@ use hrr::film::Film;
 use hrr::math::luminance;
 use hrr::render::counters::processor_seconds;
 use hrr::scene::Scene;
-use hrr::settings::{Heuristic, Integrator, Settings, Switch};
+use hrr::settings::{AutoSwitch, Heuristic, Integrator, Settings, Switch};
 use hrr::subpath::World;
 use hrr::visibility::{Hit, Ray, Visibility};
 use std::path::Path;
@@ -174,8 +174,8 @@ fn caustic(name: &str, seconds: f64, light_subpaths: u64, samples: u32) {
         ("lvc", Settings { integrator: Integrator::Lvc, ..roulette.clone() }),
         ("lvc+hrr, power heuristic", Settings { mis: Heuristic::Power, ..roulette.clone() }),
         ("lvc+hrr, all light vertices stored", Settings { storing: 1.0, ..roulette.clone() }),
-        ("lvc+hrr, unguided", Settings { guiding: Switch::Off, ..roulette.clone() }),
-        ("lvc+hrr, neither", Settings { guiding: Switch::Off, storing: 1.0, ..roulette.clone() }),
+        ("lvc+hrr, unguided", Settings { guiding: AutoSwitch::Off, ..roulette.clone() }),
+        ("lvc+hrr, neither", Settings { guiding: AutoSwitch::Off, storing: 1.0, ..roulette.clone() }),
     ];
     let seeds = [1, 2].map(|seed| Settings { seed, ..roulette.clone() });
     let world = World::new(&scene, &roulette).expect("a world");

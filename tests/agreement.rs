@@ -9,7 +9,7 @@ use hrr::light::LightSource;
 use hrr::material::Material;
 use hrr::math::Spectrum;
 use hrr::scene::Scene;
-use hrr::settings::{Backend, EmitterVertices, Heuristic, Integrator, Settings};
+use hrr::settings::{AutoSwitch, Backend, Heuristic, Integrator, Settings};
 use hrr::subpath::World;
 use std::time::{Duration, Instant};
 
@@ -18,7 +18,7 @@ fn run(scene: &Scene, integrator: Integrator, seed: u64, iterations: u64, sample
     let visibility = Backend::BEST;
     let max_depth = 8;
     let settings =
-        Settings { integrator, seed, visibility, iterations, samples, max_depth, ..Settings::default() };
+        Settings { integrator, seed, visibility, iterations, samples, max_depth, ..scenes::settings() };
     estimate(scene, &settings, 8)
 }
 
@@ -42,7 +42,7 @@ fn agree_on_cornell(iterations: u64, light_subpaths: u64, relative: f64) {
             samples: 8,
             light_subpaths: if integrator == Integrator::Lt { light_subpaths } else { 0 },
             max_depth: 8,
-            ..Settings::default()
+            ..scenes::settings()
         };
         estimate(&scene, &settings, 8).assert_agrees(&pt, relative, integrator.name());
     }
@@ -102,7 +102,7 @@ fn all_integrators_agree_on_textures_coats_and_cutouts() {
     }
     // Backends decide alike where there are holes.
     for visibility in Backend::ALL.into_iter().filter(|&b| b != Backend::BEST && b != Backend::Embree) {
-        let settings = Settings { visibility, iterations: 8, max_depth: 4, ..Settings::default() };
+        let settings = Settings { visibility, iterations: 8, max_depth: 4, ..scenes::settings() };
         let [a, b] = [Backend::BEST, visibility].map(|visibility| {
             estimate(&scene, &Settings { integrator: Integrator::Pt, visibility, ..settings.clone() }, 8)
         });
@@ -148,7 +148,7 @@ fn vertex_merging_agrees_on_every_material() {
             samples: 8,
             merge_radius: 0.01,
             max_depth: 8,
-            ..Settings::default()
+            ..scenes::settings()
         };
         estimate(&scene, &settings, 8).assert_agrees(&pt, 0.02, integrator.name());
     }
@@ -169,7 +169,7 @@ fn growing_and_adapting_keep_the_mean() {
                 seed: 100 + seed,
                 visibility: Backend::BEST,
                 max_depth: 8,
-                ..Settings::default()
+                ..scenes::settings()
             };
             let world = World::new(&scene, &settings).unwrap();
             let mut integrator = hrr::integrator::new(&world, &settings).unwrap();
@@ -233,12 +233,12 @@ fn emitter_vertices_keep_the_mean() {
                 expected: 2.0,
                 iterations: 64,
                 samples: 8,
-                ..Settings::default()
+                ..scenes::settings()
             };
             estimate(&scene, &settings, 8)
         };
         let hrr = |emitters, mis, max_depth, seed| run(Integrator::LvcHrr, emitters, mis, max_depth, seed);
-        let (on, off) = (EmitterVertices::On, EmitterVertices::Off);
+        let (on, off) = (AutoSwitch::On, AutoSwitch::Off);
         // Direct light only: the caustics of small lamps, path tracing all but misses.
         let pt = run(Integrator::Pt, off, Heuristic::Balance, 2, 1);
         let direct = hrr(on, Heuristic::Balance, 2, 2);
@@ -262,7 +262,7 @@ fn the_numerics_of_the_roulette_agree() {
             visibility: Backend::BEST,
             samples: 8,
             max_depth: 8,
-            ..Settings::default()
+            ..scenes::settings()
         };
         changes.iter().for_each(|(name, value)| settings.set(name, value).unwrap());
         estimate(&scene, &settings, 8)
@@ -296,7 +296,7 @@ fn backends_agree() {
                 visibility,
                 iterations: 8,
                 max_depth: 4,
-                ..Settings::default()
+                ..scenes::settings()
             };
             estimate(&scene, &settings, 8)
         })

@@ -27,7 +27,7 @@ fn run(settings: &Settings, threads: usize, first_iteration: u64, iterations: u6
 #[test]
 fn threads_and_parts_do_not_matter() {
     for integrator in [Integrator::Pt, Integrator::Lt, Integrator::Bpt, Integrator::Lvc, Integrator::LvcHrr] {
-        check(&Settings { integrator, ..Settings::default() }, integrator.name());
+        check(&Settings { integrator, ..scenes::settings() }, integrator.name());
     }
 }
 
@@ -58,7 +58,7 @@ fn threads_and_parts_do_not_matter_to_the_numerics_of_the_roulette() {
     ];
     let mut images = Vec::new();
     for (name, value) in changes {
-        let mut settings = Settings { integrator: Integrator::LvcHrr, ..Settings::default() };
+        let mut settings = Settings { integrator: Integrator::LvcHrr, ..scenes::settings() };
         settings.set(name, value).unwrap();
         images.push(check(&settings, value));
         let last = images.len() - 1;

@@ -72,7 +72,7 @@ fn lit(mut scene: Scene, light: LightSource) -> Scene {
 }
 
 fn settings() -> Settings {
-    Settings { visibility: Backend::Obvhs, iterations: 2, samples: 1, max_depth: 6, ..Settings::default() }
+    Settings { visibility: Backend::Obvhs, iterations: 2, samples: 1, max_depth: 6, ..scenes::settings() }
 }
 
 fn planned(scene: &Scene, settings: &Settings) -> hrr::Result<Plan> {

@@ -262,7 +262,7 @@ fn recursion_equals_the_definition_with_textures() {
 #[test]
 fn recursion_equals_the_definition_with_other_numerics() {
     let scene = scenes::box_of_everything();
-    let settings = Settings { visibility: Backend::Obvhs, ..Settings::default() };
+    let settings = Settings { visibility: Backend::Obvhs, ..scenes::settings() };
     let world = World::new(&scene, &settings).unwrap();
     let default = Numerics::DEFAULT;
     for numerics in [
@@ -276,7 +276,7 @@ fn recursion_equals_the_definition_with_other_numerics() {
 }
 
 fn check_guided(scene: &Scene, heuristic: Heuristic) {
-    let settings = Settings { visibility: Backend::Obvhs, ..Settings::default() };
+    let settings = Settings { visibility: Backend::Obvhs, ..scenes::settings() };
     let world = World::new(scene, &settings).unwrap();
     // Light that goes to one side is useful, and more so the farther.
     let observations = (1..1000).map(|i| {

@@ -1,7 +1,7 @@
 //! The settings table, the struct behind it and its TOML are one thing.
 
 use hrr::settings::{
-    Backend, EmbreeBuild, EmitterVertices, Heuristic, Integrator, Kind, LobePrecision, MinimumRule, Range,
+    AutoSwitch, Backend, EmbreeBuild, Heuristic, Integrator, Kind, LobePrecision, MinimumRule, Range,
     Setting, Settings, Switch, TABLE,
 };
 
@@ -107,8 +107,8 @@ fn every_field_has_its_row() {
     assert_eq!((node_padding, embree_robust, embree_build), (8.0, Switch::Off, EmbreeBuild::Low));
     assert_eq!((merge_radius, merge_pixels, merge_shrink), (0.5, 5.0, 1.0));
     assert_eq!((reused_subpaths, record_spacing), (50, 4));
-    assert_eq!((storing, guiding, adaptive, TABLE.len()), (0.5, Switch::Off, Switch::Off, 36));
-    assert_eq!((axis_probability, emitters), (Some(2.5), EmitterVertices::On));
+    assert_eq!((storing, guiding, adaptive, TABLE.len()), (0.5, AutoSwitch::Off, Switch::Off, 36));
+    assert_eq!((axis_probability, emitters), (Some(2.5), AutoSwitch::On));
     assert_eq!((with.to_string(), without.to_string()), ("sds".into(), "caustics,lens".into()));
 }
 

@@ -144,7 +144,7 @@ fn predictions_come_true() {
                 samples: 1,
                 light_subpaths: 512,
                 max_depth: 5,
-                ..Settings::default()
+                ..scenes::settings()
             },
             biased: false,
         });

@@ -8,7 +8,7 @@ use hrr::math::{Frame, warp};
 use hrr::mis::Heuristic;
 use hrr::roulette::{Lobe, Query, QueryCounters, probability, query};
 use hrr::sampler::{Family, Purpose, Sampler, Stream};
-use hrr::settings::{Backend, EmitterVertices, Integrator, Settings};
+use hrr::settings::{AutoSwitch, Backend, Integrator, Settings};
 use hrr::subpath::World;
 use hrr::techniques::{Lobes, Numerics, Roulette, Techniques};
 use hrr::vertex_bvh::VertexBvh;
@@ -31,7 +31,7 @@ fn total_weight(lobes: &Lobes) -> f64 {
 #[test]
 fn an_axis_probability_is_a_number_of_expected_vertices() {
     let scene = scenes::box_of_everything();
-    let world = World::new(&scene, &Settings { visibility: Backend::Obvhs, ..Settings::default() }).unwrap();
+    let world = World::new(&scene, &Settings { visibility: Backend::Obvhs, ..scenes::settings() }).unwrap();
     let area = scene.mesh.total_area();
     let points: Vec<Vec3> = (0..4096u32)
         .map(|i| Sampler::new(5, 0, Stream::Light, i.into()).u2(0, Purpose::LightPoint).as_vec2())
@@ -107,7 +107,7 @@ fn of_expected_and_axis_probability_the_least_counts() {
     let scene = scenes::box_of_everything();
     let run = |axis_probability| {
         let integrator = Integrator::LvcHrr;
-        let settings = Settings { integrator, axis_probability, samples: 2, ..Settings::default() };
+        let settings = Settings { integrator, axis_probability, samples: 2, ..scenes::settings() };
         let world = World::new(&scene, &settings).unwrap();
         let mut film = Film::new(&scene.film);
         let tally = hrr::integrator::new(&world, &settings).unwrap().iterate(0, &mut film, &|_| ()).unwrap();
@@ -126,16 +126,16 @@ fn as_many_emitter_vertices_are_kept_as_expected() {
         for expected in [0.5, 4.0] {
             let kept = |emitters| {
                 let integrator = Integrator::LvcHrr;
-                let settings = Settings { integrator, emitters, expected, samples: 4, ..Settings::default() };
+                let settings = Settings { integrator, emitters, expected, samples: 4, ..scenes::settings() };
                 let world = World::new(&scene, &settings).unwrap();
                 let mut machine = hrr::integrator::new(&world, &settings).unwrap();
                 let mut film = Film::new(&scene.film);
                 let tallies = (0..4).map(|i| machine.iterate(i, &mut film, &|_| ()).unwrap().emitters);
                 tallies.fold((0, 0), |sum, t| (sum.0 + t.queries, sum.1 + t.accepted))
             };
-            assert_eq!(kept(EmitterVertices::Off), (0, 0));
-            assert_eq!(kept(EmitterVertices::Auto).0 > 0, across > 1);
-            let (queries, accepted) = kept(EmitterVertices::On);
+            assert_eq!(kept(AutoSwitch::Off), (0, 0));
+            assert_eq!(kept(AutoSwitch::Auto).0 > 0, across > 1);
+            let (queries, accepted) = kept(AutoSwitch::On);
             let mean = accepted as f64 / queries as f64 / expected;
             println!("{across}^2 lamps, {expected} expected: {mean} of these");
             assert!((0.5..2.0).contains(&mean), "{across}^2 lamps, {expected} expected: {mean} of these");

@@ -5,7 +5,7 @@ use crate::{load, scenes};
 use hrr::film::{Film, FilmSettings};
 use hrr::math::luminance;
 use hrr::scene::Scene;
-use hrr::settings::{EmitterVertices, Integrator, Settings};
+use hrr::settings::{AutoSwitch, Integrator, Settings};
 use hrr::subpath::World;
 
 /// Mean and square of each pixel over iterations, and the time.
@@ -30,7 +30,7 @@ impl Sums {
 
 /// Iterations with and without, in turn; variance of a pixel over them times seconds.
 fn compare(name: &str, scene: &Scene, settings: &Settings, rounds: u64) {
-    let variants = [EmitterVertices::Off, EmitterVertices::On].map(|emitters| Settings {
+    let variants = [AutoSwitch::Off, AutoSwitch::On].map(|emitters| Settings {
         integrator: Integrator::LvcHrr,
         emitters,
         ..settings.clone()

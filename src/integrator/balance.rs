@@ -43,8 +43,10 @@ impl Known<'_> {
     /// The share of the time that the light side should have; `None` where nothing is noisy.
     pub fn light_share(&self, costs: &Costs) -> Option<f64> {
         let weights = weights(self.needs);
-        let splats: Vec<f64> =
-            around(self.splats, self.width, |sum, v| *sum += v).into_iter().map(|(sum, n)| sum / n).collect();
+        let splats: Vec<f64> = around(self.splats, self.width, |sum: &mut f64, v| *sum += v)
+            .into_iter()
+            .map(|(sum, n)| sum / n)
+            .collect();
         let (least, most, steps) = TRIED;
         let share = |step: u32| least * (most / least).powf(f64::from(step) / f64::from(steps - 1));
         let errors = (0..steps).map(|step| (share(step), self.error(&weights, &splats, costs, share(step))));

@@ -14,7 +14,7 @@ use crate::light_cache::LightCache;
 use crate::roulette::Pregenerated;
 use crate::sampler::Stream;
 use crate::scene::Scene;
-use crate::settings::{Settings, Switch};
+use crate::settings::{AutoSwitch, Settings};
 use crate::subpath::{Storing, World};
 use crate::tally::Tally;
 use crate::techniques::{Merging, Numerics, Roulette, Techniques};
@@ -80,6 +80,17 @@ impl<'a> Bidirectional<'a> {
         Ok(machine)
     }
 
+    /// Whether light subpaths follow what a pre-pass found useful. What merging finds is on all surfaces, and noisier where
+    /// fewer of them go.
+    fn is_guided(&self) -> bool {
+        self.recipe.roulette
+            && match self.settings.guiding {
+                AutoSwitch::Off => false,
+                AutoSwitch::On => true,
+                AutoSwitch::Auto => !self.recipe.merging,
+            }
+    }
+
     /// Sets how often each technique tries, per eye sample.
     pub(super) fn plan(&mut self) {
         self.techniques.storing = Storing {
@@ -140,7 +151,7 @@ impl Integrator for Bidirectional<'_> {
             light_subpaths: if self.recipe.base == Base::OwnPath { all } else { size.light_subpaths },
             ..size
         };
-        if self.recipe.roulette && self.settings.guiding == Switch::On {
+        if self.is_guided() {
             self.learn_guide()?;
         }
         self.plan();

@@ -12,7 +12,7 @@ use crate::light::LightPoint;
 use crate::math::Spectrum;
 use crate::roulette::{self, Query};
 use crate::sampler::{Family, Purpose, Sampler, Stream};
-use crate::settings::EmitterVertices;
+use crate::settings::AutoSwitch;
 use crate::subpath::World;
 use crate::tally::{Clock, Tally};
 use crate::techniques::EmitterRoulette;
@@ -54,9 +54,9 @@ impl Bidirectional<'_> {
     /// How the roulette judges points of lights; `None` where it does not.
     pub(super) fn plan_emitters(&self) -> Option<EmitterRoulette> {
         let wanted = match self.settings.emitters {
-            EmitterVertices::Off => false,
-            EmitterVertices::On => true,
-            EmitterVertices::Auto => self.world.lights.near_count() >= MANY,
+            AutoSwitch::Off => false,
+            AutoSwitch::On => true,
+            AutoSwitch::Auto => self.world.lights.near_count() >= MANY,
         };
         if !(wanted && self.recipe.roulette && self.recipe.next_event) {
             return None;

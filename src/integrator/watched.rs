@@ -98,15 +98,6 @@ impl Need {
         self.mean += other.mean;
         self.work += other.work;
     }
-
-    fn over(&self, count: f64) -> Self {
-        Self {
-            roulette: self.roulette / count,
-            rest: self.rest / count,
-            mean: self.mean / count,
-            work: self.work / count,
-        }
-    }
 }
 
 /// What iterations so far showed of every pixel.
@@ -135,19 +126,45 @@ impl Watched {
             return None;
         }
         let each: Vec<Need> = self.pixels.iter().map(PixelSums::need).collect();
-        let add = |sum: &mut Need, need: &Need| sum.plus(need);
-        Some(around(&each, self.width, add).into_iter().map(|(sum, n)| sum.over(n)).collect())
+        Some(around(&each, self.width, Around::add).into_iter().map(|(all, n)| all.mean(n)).collect())
+    }
+}
+
+/// The needs around a pixel.
+#[derive(Default)]
+struct Around {
+    sum: Need,
+    /// The largest variances: one bright sample in 25 pixels is chance, and would have samples follow it.
+    most: [f64; 2],
+}
+
+impl Around {
+    fn add(&mut self, need: &Need) {
+        self.sum.plus(need);
+        self.most = [self.most[0].max(need.roulette), self.most[1].max(need.rest)];
+    }
+
+    /// Of this many pixels; variances without the largest one, where it is one of a block.
+    fn mean(&self, count: f64) -> Need {
+        let dropped = if count < 9.0 { 0.0 } else { 1.0 };
+        let without = |sum: f64, most: f64| (sum - dropped * most).max(0.0) / (count - dropped);
+        Need {
+            roulette: without(self.sum.roulette, self.most[0]),
+            rest: without(self.sum.rest, self.most[1]),
+            mean: self.sum.mean / count,
+            work: self.sum.work / count,
+        }
     }
 }
 
 /// Sums over the square around each pixel, and how many pixels of it there are.
-pub(super) fn around<T: Default>(each: &[T], width: usize, add: impl Fn(&mut T, &T)) -> Vec<(T, f64)> {
+pub(super) fn around<T, S: Default>(each: &[T], width: usize, add: impl Fn(&mut S, &T)) -> Vec<(S, f64)> {
     let height = each.len() / width.max(1);
     (0..each.len())
         .map(|i| {
             let (x, y) = (i % width, i / width);
             let range = |at: usize, size: usize| at.saturating_sub(AROUND)..(at + AROUND + 1).min(size);
-            let (mut sum, mut count) = (T::default(), 0.0);
+            let (mut sum, mut count) = (S::default(), 0.0);
             for row in range(y, height) {
                 for value in &each[row * width..][range(x, width)] {
                     add(&mut sum, value);
@@ -190,12 +207,24 @@ pub(super) mod tests {
     fn noise_is_told_apart_by_where_it_comes_from() {
         let needs = watched(|x| if x < 20 { (0.0, 0.1) } else { (0.3, 0.2) }, 7.0).needs().unwrap();
         for (x, roulette, rest) in
-            [(5, 0.0, 0.01), (35, 0.09, 0.04), (19, 0.4 * 0.09, 0.6 * 0.01 + 0.4 * 0.04)]
+            [(5, 0.0, 0.01), (35, 0.09, 0.04), (19, 9.0 * 0.09 / 24.0, (15.0 * 0.01 + 9.0 * 0.04) / 24.0)]
         {
             let need = needs[10 * 40 + x];
             assert!((need.roulette - roulette).abs() < 1e-12 && (need.rest - rest).abs() < 1e-12, "{need:?}");
             assert!((need.mean - 1.0).abs() < 1e-12 && (need.work - 7.0).abs() < 1e-12, "{need:?}");
         }
         assert!(Watched::new(4, 4).needs().is_none());
+    }
+
+    #[test]
+    fn one_bright_sample_draws_no_others() {
+        let mut watched = watched(|_| (0.1, 0.2), 7.0);
+        let before = watched.needs().unwrap()[10 * 40 + 20];
+        let mut bright = PixelSums::default();
+        bright.add(&Seen { radiance: Spectrum::splat(1e3), roulette: Spectrum::splat(9e2) }, 1.0, 7.0);
+        watched.add(20, 10, &bright);
+        let after = watched.needs().unwrap()[10 * 40 + 20];
+        assert!((after.roulette - before.roulette).abs() < 1e-12 && (after.rest - before.rest).abs() < 1e-12);
+        assert!(after.mean > before.mean);
     }
 }

@@ -165,7 +165,7 @@ choice! {
 
 choice! {
     /// Whether something is done.
-    Switch, "guiding", guiding {
+    Switch, "adaptive", adaptive {
         /// It is not.
         Off = "off",
         /// It is.
@@ -174,13 +174,13 @@ choice! {
 }
 
 choice! {
-    /// Whether the roulette judges points of lights as well.
-    EmitterVertices, "emitters", emitters {
-        /// It does not.
+    /// Whether something is done, or done where it is known to help.
+    AutoSwitch, "emitters", emitters {
+        /// It is not.
         Off = "off",
-        /// It does.
+        /// It is.
         On = "on",
-        /// Where there are many lights.
+        /// Where it helps.
         Auto = "auto",
     }
 }
@@ -194,7 +194,7 @@ mod tests {
         assert!(Integrator::ALL.iter().all(|v| v.to_string().parse() == Ok(*v)));
         assert!(Backend::ALL.iter().all(|v| v.to_string().parse() == Ok(*v)));
         assert!(Switch::ALL.iter().all(|v| v.to_string().parse() == Ok(*v)));
-        assert!(EmitterVertices::ALL.iter().all(|v| v.to_string().parse() == Ok(*v)));
+        assert!(AutoSwitch::ALL.iter().all(|v| v.to_string().parse() == Ok(*v)));
         assert!(Heuristic::ALL.iter().all(|v| v.to_string().parse() == Ok(*v)));
         assert!(Range::ALL.iter().all(|v| v.to_string().parse() == Ok(*v)));
         assert!(LobePrecision::ALL.iter().all(|v| v.to_string().parse() == Ok(*v)));

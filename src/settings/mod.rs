@@ -6,7 +6,7 @@ mod effects;
 mod table;
 
 pub use choices::{
-    Backend, EmbreeBuild, EmitterVertices, Heuristic, Integrator, LobePrecision, MinimumRule, Range, Switch,
+    AutoSwitch, Backend, EmbreeBuild, Heuristic, Integrator, LobePrecision, MinimumRule, Range, Switch,
 };
 pub use effects::{Effect, EffectSet};
 pub use table::TABLE;
@@ -73,9 +73,9 @@ pub struct Settings {
     /// Probability of storing a light vertex whose predecessor does not scatter narrowly, where the roulette plays.
     pub storing: f64,
     /// Whether the roulette judges points of lights as well.
-    pub emitters: EmitterVertices,
+    pub emitters: AutoSwitch,
     /// Whether light subpaths are sent where earlier ones proved useful to the roulette.
-    pub guiding: Switch,
+    pub guiding: AutoSwitch,
     /// Whether eye samples go to the pixels that need them, where the renderer chooses their number.
     pub adaptive: Switch,
     /// How techniques that find the same path share its weight.
@@ -114,7 +114,7 @@ impl Default for Settings {
             connections: 1,
             expected: 1.0,
             axis_probability: None,
-            hrr_alpha: 0.3,
+            hrr_alpha: 0.1,
             range: Range::Ellipsoid,
             minimum: MinimumRule::Nested,
             lobe_precision: LobePrecision::F64,
@@ -122,8 +122,8 @@ impl Default for Settings {
             lobe_floor: 0.0,
             node_padding: 1.0,
             storing: 0.05,
-            emitters: EmitterVertices::Auto,
-            guiding: Switch::On,
+            emitters: AutoSwitch::Auto,
+            guiding: AutoSwitch::Auto,
             adaptive: Switch::On,
             mis: Heuristic::Balance,
             reused_subpaths: 100,

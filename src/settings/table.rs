@@ -1,7 +1,7 @@
 //! One row for every setting.
 
 use super::{
-    Backend, EmbreeBuild, EmitterVertices, Heuristic, Integrator, Kind, LobePrecision, MinimumRule, Range,
+    AutoSwitch, Backend, EmbreeBuild, Heuristic, Integrator, Kind, LobePrecision, MinimumRule, Range,
     Setting, Switch,
 };
 
@@ -135,12 +135,12 @@ pub const TABLE: &[Setting] = &[
     Setting {
         name: "hrr_alpha",
         kind: Kind::Real { min: 0.0, max: 1.0, get: |s| Some(s.hrr_alpha), set: |s, v| s.hrr_alpha = v },
-        default: "0.3",
+        default: "0.1",
         value_name: "ALPHA",
         heading: TRANSPORT,
         help: "Largest GGX roughness at which the roulette is used",
-        doc: "Where wide lobes are seen at grazing angles, 0.1 is better: scattering and next-event estimation serve \
-              them as well, without the time of the roulette.",
+        doc: "Wider lobes, seen at grazing angles above all, are served better by scattering and by next-event \
+              estimation.",
     },
     Setting {
         name: "range",
@@ -243,10 +243,10 @@ pub const TABLE: &[Setting] = &[
     Setting {
         name: "emitters",
         kind: Kind::Choice {
-            names: &EmitterVertices::NAMES,
+            names: &AutoSwitch::NAMES,
             planned: &[],
             get: |s| s.emitters as usize,
-            set: |s, i| s.emitters = EmitterVertices::ALL[i],
+            set: |s, i| s.emitters = AutoSwitch::ALL[i],
         },
         default: "auto",
         value_name: "NAME",
@@ -260,17 +260,18 @@ pub const TABLE: &[Setting] = &[
     Setting {
         name: "guiding",
         kind: Kind::Choice {
-            names: &Switch::NAMES,
+            names: &AutoSwitch::NAMES,
             planned: &[],
             get: |s| s.guiding as usize,
-            set: |s, i| s.guiding = Switch::ALL[i],
+            set: |s, i| s.guiding = AutoSwitch::ALL[i],
         },
-        default: "on",
+        default: "auto",
         value_name: "NAME",
         heading: TRANSPORT,
         help: "Whether emitters send light (+hrr) where a pre-pass found it useful",
         doc: "on: towards what reaches the image by way of surfaces where the roulette plays; three directions \
-              of ten stay as they are without. off: by the cosine alone.",
+              of ten stay as they are without. off: by the cosine alone. auto: on, but off beside vertex merging, \
+              which wants light everywhere.",
     },
     Setting {
         name: "adaptive",

@@ -22,6 +22,11 @@ pub fn load(name: &str, overrides: &[(&str, &str)]) -> Scene {
     Scene::load(&path, &overrides).unwrap()
 }
 
+/// Default settings, but that the roulette plays on the rougher metals of these scenes too.
+pub fn settings() -> Settings {
+    Settings { hrr_alpha: 0.3, ..Settings::default() }
+}
+
 /// The inside of a box, two metres wide, with a side for every kind of material and a lamp under the ceiling.
 pub fn box_of_everything() -> Scene {
     let gold = Reflectance::Schlick { f0: Spectrum::new(0.9, 0.7, 0.3) };
