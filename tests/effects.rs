@@ -5,7 +5,7 @@ mod coverage;
 mod images;
 mod predicates;
 
-use crate::support::scenes::{cube, in_memory, quad};
+use crate::support::scenes::{self, cube, in_memory, quad};
 use glam::{DVec2, DVec3, Vec3};
 use hrr::effects::{Effect, Verdict, analyze};
 use hrr::geometry::Mesh;
