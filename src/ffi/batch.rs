@@ -35,7 +35,7 @@ unsafe fn part(
     for i in range {
         let Part { hits, counters, .. } = &mut part;
         // SAFETY: below the number of queries; the caller passes on its own caller's word.
-        let outcome = unsafe { run(cache, queries.get(i), options, counters, |hit| hits.push(hit)) };
+        let outcome = unsafe { run(cache, queries.at(i), options, counters, |hit| hits.push(hit)) };
         outcome.map_err(|f| Failure { message: format!("queries[{i}]: {}", f.message), ..f })?;
         part.ends.push(part.hits.len() as u64);
     }
