@@ -9,8 +9,8 @@ use super::tasks;
 use crate::roulette::QueryCounters;
 use std::sync::OnceLock;
 
-/// Queries of one task.
-const GRAIN: usize = 256;
+/// Queries of one task. Few under Miri, which is slow, and should see several tasks.
+const GRAIN: usize = if cfg!(miri) { 2 } else { 256 };
 
 /// Most queries of one call.
 const MAX_QUERIES: u64 = 1 << 36;
