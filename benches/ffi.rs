@@ -8,8 +8,10 @@
 mod workload;
 
 use hrr::ffi::*;
-use hrr::roulette::{Query, QueryCounters, query};
+use hrr::math::Frame;
+use hrr::roulette::{Lobe, Query, QueryCounters, query};
 use hrr::vertex_bvh::VertexBvh;
+use std::borrow::Borrow;
 use std::ptr::{null, null_mut};
 use workload::{EyeVertex, cpu_seconds, eye_vertices, light_vertices};
 
@@ -41,12 +43,43 @@ fn cache(points: &[glam::Vec3]) -> (*mut HrrContext, *mut HrrCache) {
     (context, cache)
 }
 
-fn in_rust(bvh: &VertexBvh, eyes: &[EyeVertex], constant: f64) -> (f64, u64) {
+/// An eye vertex' lobe as numbers: what an application has before either interface.
+#[derive(Clone, Copy)]
+struct Numbers {
+    frame: Frame,
+    alpha: (f64, f64),
+    weight: f64,
+}
+
+impl Numbers {
+    fn of(lobe: &Lobe) -> Self {
+        Self { frame: *lobe.frame(), alpha: lobe.alpha(), weight: lobe.weight() }
+    }
+
+    fn in_rust(&self) -> Lobe {
+        Lobe::new(self.frame, self.alpha.0, self.alpha.1, self.weight)
+    }
+
+    fn in_c(&self) -> HrrLobe {
+        let [x, y, z] = [self.frame.x, self.frame.y, self.frame.z].map(|v| v.to_array());
+        HrrLobe { x, y, z, alpha_x: self.alpha.0, alpha_y: self.alpha.1, weight: self.weight }
+    }
+}
+
+/// Time and hits of all queries; `lobe` gives or makes that of the i-th.
+#[inline(always)]
+fn in_rust<L: Borrow<Lobe>>(
+    bvh: &VertexBvh,
+    eyes: &[EyeVertex],
+    constant: f64,
+    lobe: impl Fn(usize) -> L,
+) -> (f64, u64) {
     let (mut did, mut hits) = (QueryCounters::default(), Vec::with_capacity(4096));
     let start = cpu_seconds();
-    for eye in eyes {
+    for (i, eye) in eyes.iter().enumerate() {
         hits.clear();
-        let ask = Query::new(eye.position, &eye.lobes, constant, eye.key);
+        let lobe = lobe(i);
+        let ask = Query::new(eye.position, std::slice::from_ref(lobe.borrow()), constant, eye.key);
         query(bvh, &ask, &mut did, &mut |id, probability| {
             hits.push(HrrHit { id: id.into(), probability });
         });
@@ -55,14 +88,22 @@ fn in_rust(bvh: &VertexBvh, eyes: &[EyeVertex], constant: f64) -> (f64, u64) {
     (cpu_seconds() - start, did.accepted)
 }
 
-fn in_c(cache: *const HrrCache, eyes: &[EyeVertex], lobes: &[[HrrLobe; 1]], constant: f64) -> (f64, u64) {
+/// The same through C.
+#[inline(always)]
+fn in_c<L: Borrow<HrrLobe>>(
+    cache: *const HrrCache,
+    eyes: &[EyeVertex],
+    constant: f64,
+    lobe: impl Fn(usize) -> L,
+) -> (f64, u64) {
     let mut hits = vec![HrrHit { id: 0, probability: 0.0 }; 4096];
     let (mut count, mut did) = (0, HrrCounters::default());
     let start = cpu_seconds();
-    for (eye, lobes) in eyes.iter().zip(lobes) {
+    for (i, eye) in eyes.iter().enumerate() {
+        let lobe = lobe(i);
         let ask = HrrQuery {
             position: eye.position.to_array(),
-            lobes: lobes.as_ptr(),
+            lobes: lobe.borrow(),
             lobe_count: 1,
             mask: u32::MAX,
             constant,
@@ -76,31 +117,51 @@ fn in_c(cache: *const HrrCache, eyes: &[EyeVertex], lobes: &[[HrrLobe; 1]], cons
     (cpu_seconds() - start, did.accepted)
 }
 
+/// The median ratio of C to Rust, and the seconds of that pair.
+fn median(mut rust: impl FnMut() -> (f64, u64), mut c: impl FnMut() -> (f64, u64)) -> (f64, f64, f64) {
+    let mut pairs: Vec<_> = (0..PAIRS)
+        .map(|_| {
+            let ((rust, found), (c, same)) = (rust(), c());
+            assert_eq!(found, same);
+            (c / rust, rust, c)
+        })
+        .collect();
+    pairs.sort_by(|a, b| a.0.total_cmp(&b.0));
+    pairs[PAIRS / 2]
+}
+
 fn main() {
     println!(
-        "{:>9} {:>8} {:>10} {:>10} {:>9}  (median of {PAIRS} pairs)",
-        "vertices", "alpha", "Rust us", "C us", "C / Rust"
+        "Medians of {PAIRS} pairs. \"made\": Rust has its lobe already, C checks and converts one in each call."
+    );
+    println!("\"numbers\": both begin with a frame, two alphas and a weight.");
+    println!(
+        "{:>9} {:>8} {:>10} {:>10} {:>9} {:>10} {:>10} {:>9}",
+        "vertices", "alpha", "Rust us", "C us", "made", "Rust us", "C us", "numbers"
     );
     for (n, alpha) in [(10_000, 1e-3), (1_000_000, 1e-4), (1_000_000, 1e-2)] {
         let points = light_vertices(n);
         let constant = CONSTANT_K * 24.0 / n as f64;
         let eyes = eye_vertices(2000, alpha, alpha);
-        let lobes: Vec<[HrrLobe; 1]> = eyes.iter().map(|eye| eye.lobes.map(HrrLobe::from)).collect();
+        let numbers: Vec<_> = eyes.iter().map(|eye| Numbers::of(&eye.lobes[0])).collect();
+        let lobes: Vec<_> = numbers.iter().map(Numbers::in_c).collect();
         let mut bvh = VertexBvh::new();
         bvh.build(&points).unwrap();
         let (context, cache) = cache(&points);
-        let mut pairs: Vec<(f64, f64, f64)> = (0..PAIRS)
-            .map(|_| {
-                let (rust, found) = in_rust(&bvh, &eyes, constant);
-                let (c, same) = in_c(cache, &eyes, &lobes, constant);
-                assert_eq!(found, same);
-                (c / rust, rust, c)
-            })
-            .collect();
-        pairs.sort_by(|a, b| a.0.total_cmp(&b.0));
-        let (ratio, rust, c) = pairs[PAIRS / 2];
+        let made = median(
+            || in_rust(&bvh, &eyes, constant, |i| &eyes[i].lobes[0]),
+            || in_c(cache, &eyes, constant, |i| &lobes[i]),
+        );
+        let from_numbers = median(
+            || in_rust(&bvh, &eyes, constant, |i| numbers[i].in_rust()),
+            || in_c(cache, &eyes, constant, |i| numbers[i].in_c()),
+        );
         let us = |seconds: f64| seconds / eyes.len() as f64 * 1e6;
-        println!("{n:9} {alpha:8.0e} {:10.3} {:10.3} {ratio:9.3}", us(rust), us(c));
+        print!("{n:9} {alpha:8.0e}");
+        for (ratio, rust, c) in [made, from_numbers] {
+            print!(" {:10.3} {:10.3} {ratio:9.3}", us(rust), us(c));
+        }
+        println!();
         // SAFETY: the references of `cache`.
         unsafe {
             hrr_cache_release(cache);

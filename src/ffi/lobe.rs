@@ -3,9 +3,10 @@
 use super::pointer::{self, Out};
 use super::status::{Failure, HrrStatus, Outcome, guard};
 use crate::math::Frame;
+use crate::roulette::lobe::MIN_ALPHA;
 use crate::roulette::{self, Lobe, MAX_LOBES};
 use glam::DVec3;
-use smallvec::SmallVec;
+use std::mem::MaybeUninit;
 
 /// Most lobes of one query.
 pub const HRR_MAX_LOBES: u32 = 8;
@@ -56,26 +57,20 @@ impl HrrLobe {
     #[inline(always)]
     fn is_exact(&self) -> bool {
         let [x, y, z] = [self.x, self.y, self.z].map(DVec3::from_array);
-        let one = |v: DVec3| (v.length_squared() - 1.0).abs() <= EXACT;
-        let none = |a: DVec3, b: DVec3| a.dot(b).abs() <= EXACT;
-        let alpha = |alpha: f64| (alpha > 0.0) & (alpha <= 1.0);
-        // Without a branch for each.
-        one(x)
-            & one(y)
-            & one(z)
-            & none(x, y)
-            & none(y, z)
-            & none(z, x)
-            & alpha(self.alpha_x)
-            & alpha(self.alpha_y)
-            & (self.weight >= 0.0)
-            & (self.weight <= f64::MAX)
+        let lengths = DVec3::new(x.length_squared(), y.length_squared(), z.length_squared()) - 1.0;
+        let angles = DVec3::new(x.dot(y), y.dot(z), z.dot(x));
+        // One comparison for all six, which a NaN among them fails.
+        lengths.length_squared() + angles.length_squared() <= EXACT * EXACT
+            && (MIN_ALPHA..=1.0).contains(&self.alpha_x)
+            && (MIN_ALPHA..=1.0).contains(&self.alpha_y)
+            && (0.0..=f64::MAX).contains(&self.weight)
     }
 
+    /// The library's lobe, of one that [`HrrLobe::is_exact`].
     #[inline(always)]
     fn lobe(&self) -> Lobe {
         let [x, y, z] = [self.x, self.y, self.z].map(DVec3::from_array);
-        Lobe::new(Frame { x, y, z }, self.alpha_x, self.alpha_y, self.weight)
+        Lobe::within_bounds(Frame { x, y, z }, self.alpha_x, self.alpha_y, self.weight)
     }
 
     /// What is wrong with a lobe, or the lobe with its frame made good.
@@ -98,34 +93,50 @@ impl HrrLobe {
             return Err(Failure::argument(message));
         }
         // Culling counts on an exact frame; the lobe does not tell y from -y.
-        let Frame { x, y, z } = Frame::from_z_tangent(z.normalize(), x);
-        let [x, y, z] = [x, y, z].map(|v| v.to_array());
-        Ok(Self { x, y, z, ..self }.lobe())
+        let frame = if off <= EXACT { Frame { x, y, z } } else { Frame::from_z_tangent(z.normalize(), x) };
+        Ok(Lobe::new(frame, self.alpha_x, self.alpha_y, self.weight))
     }
 }
 
-/// The lobes of a query, in a place that needs no allocation, and that is not moved about.
-#[derive(Default)]
-pub(super) struct Lobes(SmallVec<[Lobe; MAX_LOBES]>);
+/// Room for the lobes of a query, which are made in their place and not moved about.
+pub(super) struct Lobes([MaybeUninit<Lobe>; MAX_LOBES]);
 
 impl Lobes {
     #[inline(always)]
+    pub fn new() -> Self {
+        Self([const { MaybeUninit::uninit() }; MAX_LOBES])
+    }
+
+    #[inline(always)]
     pub unsafe fn read(&mut self, lobes: *const HrrLobe, count: u32) -> Outcome<&[Lobe]> {
-        if count > HRR_MAX_LOBES {
-            return Err(Failure::argument(format!("{count} lobes: at most {HRR_MAX_LOBES}")));
+        #[cold]
+        fn too_many(count: u32) -> Failure {
+            Failure::argument(format!("{count} lobes: at most {HRR_MAX_LOBES}"))
         }
-        for i in 0..count as usize {
-            // SAFETY: below `count`, which the caller vouches for; NULL stays NULL.
-            let lobe =
-                unsafe { pointer::copy(lobes.wrapping_add(if lobes.is_null() { 0 } else { i }), "lobes") }?;
-            // Not by way of a result, which is a lobe more to be carried about.
-            if lobe.is_exact() {
-                self.0.push(lobe.lobe());
-            } else {
-                self.0.push(lobe.check_closely(format!("lobes[{i}]"))?);
+        /// Reads it again, lest it be kept in memory for this.
+        #[cold]
+        unsafe fn closely(lobe: *const HrrLobe, index: usize) -> Outcome<Lobe> {
+            // SAFETY: passed on.
+            unsafe { lobe.read_unaligned() }.check_closely(format!("lobes[{index}]"))
+        }
+        let Some(places) = self.0.get_mut(..count as usize) else { return Err(too_many(count)) };
+        if count > 0 {
+            pointer::given(lobes, "lobes")?;
+        }
+        for (i, place) in places.iter_mut().enumerate() {
+            // SAFETY: below `count`, which the caller vouches for.
+            unsafe {
+                let (at, lobe) = (lobes.add(i), lobes.add(i).read_unaligned());
+                // Not by way of a result, which is a lobe more to be carried about.
+                if lobe.is_exact() {
+                    place.write(lobe.lobe());
+                } else {
+                    place.write(closely(at, i)?);
+                }
             }
         }
-        Ok(&self.0)
+        // SAFETY: all of them were written just now.
+        Ok(unsafe { places.assume_init_ref() })
     }
 }
 
@@ -290,7 +301,7 @@ pub unsafe extern "C" fn hrr_probability(
         // SAFETY: this module's contract.
         unsafe {
             let out = Out::new(out_probability, "out_probability")?;
-            let mut read = Lobes::default();
+            let mut read = Lobes::new();
             let lobes = read.read(lobes, lobe_count)?;
             let constant = self::constant(constant)?;
             let offset = pointer::vector(offset, "offset")?;

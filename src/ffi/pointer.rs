@@ -25,7 +25,7 @@ impl<F> Callback<F> {
 /// A text of the host's, in UTF-8.
 pub(super) unsafe fn text<'a>(pointer: *const c_char, name: &str) -> Outcome<&'a str> {
     if pointer.is_null() {
-        return Err(Failure::argument(format!("{name} is NULL")));
+        return Err(is_null(name));
     }
     // SAFETY: not NULL; the caller vouches that it ends with a zero.
     let text = unsafe { CStr::from_ptr(pointer) };
@@ -33,6 +33,7 @@ pub(super) unsafe fn text<'a>(pointer: *const c_char, name: &str) -> Outcome<&'a
 }
 
 /// A handle's object, kept alive by the host.
+#[inline(always)]
 pub(super) unsafe fn object<'a, T>(handle: *const T, name: &str) -> Outcome<&'a T> {
     aligned(handle, name)?;
     // SAFETY: not NULL and aligned; the caller vouches that it is a live handle.
@@ -60,12 +61,23 @@ pub(super) unsafe fn release<T>(handle: *const T) {
     }
 }
 
+#[cold]
+fn is_null(name: &str) -> Failure {
+    Failure::argument(format!("{name} is NULL"))
+}
+
+#[cold]
+fn is_not_aligned(name: &str) -> Failure {
+    Failure::argument(format!("{name} is not aligned"))
+}
+
+#[inline(always)]
 fn aligned<T>(pointer: *const T, name: &str) -> Outcome {
     if pointer.is_null() {
-        return Err(Failure::argument(format!("{name} is NULL")));
+        return Err(is_null(name));
     }
     if !pointer.is_aligned() {
-        return Err(Failure::argument(format!("{name} is not aligned")));
+        return Err(is_not_aligned(name));
     }
     Ok(())
 }
@@ -76,6 +88,7 @@ pub(super) struct Out<T>(*mut T);
 
 impl<T> Out<T> {
     /// Checks the pointer that a result will be written to.
+    #[inline(always)]
     pub unsafe fn new(pointer: *mut T, name: &str) -> Outcome<Self> {
         aligned(pointer.cast_const(), name)?;
         Ok(Self(pointer))
@@ -115,11 +128,15 @@ impl<T: Copy> Out<T> {
     }
 }
 
+/// A pointer that is not NULL.
+#[inline(always)]
+pub(super) fn given<T>(pointer: *const T, name: &str) -> Outcome<*const T> {
+    if pointer.is_null() { Err(is_null(name)) } else { Ok(pointer) }
+}
+
 /// A copy of one thing, which need not be aligned.
 pub(super) unsafe fn copy<T: Copy>(pointer: *const T, name: &str) -> Outcome<T> {
-    if pointer.is_null() {
-        return Err(Failure::argument(format!("{name} is NULL")));
-    }
+    given(pointer, name)?;
     // SAFETY: not NULL; the caller vouches for the rest.
     Ok(unsafe { pointer.read_unaligned() })
 }
@@ -199,9 +216,15 @@ impl<T: Copy> Strided<T> {
         Ok(Self { first, stride })
     }
 
+    /// Where the `index`-th lies.
+    pub unsafe fn at(&self, index: usize) -> *const T {
+        // SAFETY: the caller vouches that `index` is below the count.
+        unsafe { self.first.byte_add(index * self.stride) }
+    }
+
     /// The `index`-th.
     pub unsafe fn get(&self, index: usize) -> T {
         // SAFETY: the caller vouches that `index` is below the count, and for what is there.
-        unsafe { self.first.byte_add(index * self.stride).read_unaligned() }
+        unsafe { self.at(index).read_unaligned() }
     }
 }

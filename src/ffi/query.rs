@@ -5,7 +5,7 @@ use super::capture::{Made, Seen};
 use super::lobe::{HrrLobe, Lobes, constant};
 use super::pointer::{self, Out};
 use super::status::{Failure, HRR_ERROR_BUFFER_TOO_SMALL, HRR_ERROR_CALLBACK, HrrStatus, Outcome, guard};
-use crate::roulette::{MinimumRandom, Query, QueryCounters, query, query_brute_force};
+use crate::roulette::{self, MinimumRandom, Query, QueryCounters, query_brute_force};
 use crate::sampler::counter::combine;
 use glam::DVec3;
 use std::ffi::c_void;
@@ -104,10 +104,13 @@ pub(super) struct Options {
 }
 
 impl Options {
+    #[inline(always)]
     pub unsafe fn read(options: *const HrrQueryOptions) -> Outcome<Self> {
-        if options.is_null() {
-            return Ok(Self::default());
-        }
+        // SAFETY: passed on.
+        if options.is_null() { Ok(Self::default()) } else { unsafe { Self::read_given(options) } }
+    }
+
+    unsafe fn read_given(options: *const HrrQueryOptions) -> Outcome<Self> {
         // SAFETY: passed on.
         let o = unsafe { pointer::sized(options, "options") }?;
         if o.reserved != 0 {
@@ -141,67 +144,92 @@ pub(super) fn rule_number(rule: MinimumRandom) -> u32 {
 
 /// What makes no query of a host's.
 #[cold]
-fn wrong(ask: HrrQuery) -> Failure {
-    if ask.mask == 0 {
+fn wrong(position: DVec3, mask: u32) -> Failure {
+    if mask == 0 {
         return Failure::argument("query->mask is 0: no light vertex shares a bit with it");
     }
-    Failure::non_finite(format!("query->position is {}", DVec3::from_array(ask.position)))
+    Failure::non_finite(format!("query->position is {position}"))
 }
 
-/// Answers a query; `visit` gets every hit.
+impl HrrQuery {
+    /// A host's query, which need not be aligned, read as it was written: a whole that is read just after its parts were
+    /// written waits until they are in the memory.
+    #[inline(always)]
+    unsafe fn read(query: *const Self) -> Self {
+        macro_rules! part {
+            ($($part:tt)*) => {
+                // SAFETY: part of what the caller vouches for.
+                unsafe { (&raw const (*query).$($part)*).read_unaligned() }
+            };
+        }
+        Self {
+            position: [part!(position[0]), part!(position[1]), part!(position[2])],
+            lobes: part!(lobes),
+            lobe_count: part!(lobe_count),
+            mask: part!(mask),
+            constant: part!(constant),
+            key: part!(key),
+        }
+    }
+}
+
+/// Answers a query, which is not NULL; `visit` gets every hit.
 ///
-/// Part of the functions that call it, and the query in their registers: what a host has written number by number just
-/// before is not to be read again in other pieces, which would wait until the writing is done.
+/// Part of the functions that call it, so that the query stays in their registers.
 #[inline(always)]
 pub(super) unsafe fn run(
     cache: &HrrCache,
-    ask: HrrQuery,
+    query: *const HrrQuery,
     options: Options,
     counters: &mut QueryCounters,
     mut visit: impl FnMut(HrrHit),
 ) -> Outcome {
+    // SAFETY: passed on.
+    let ask = unsafe { HrrQuery::read(query) };
     let position = DVec3::from_array(ask.position);
-    if !position.is_finite() || ask.mask == 0 {
-        return Err(wrong(ask));
+    // 0 times what is not finite is NaN.
+    if position * 0.0 != DVec3::ZERO || ask.mask == 0 {
+        return Err(wrong(position, ask.mask));
     }
-    let mut read = Lobes::default();
+    let mut read = Lobes::new();
     // SAFETY: passed on.
     let lobes = unsafe { read.read(ask.lobes, ask.lobe_count) }?;
     let constant = constant(ask.constant)?;
+    let Options { rule, brute_force } = options;
     let mut inner = Query::new(cache.relative(position), lobes, constant, ask.key);
-    (inner.mask, inner.rule) = (ask.mask, options.rule);
+    (inner.mask, inner.rule) = (ask.mask, rule);
     let bvh = &cache.storage.bvh;
-    let (captured, mut seen) = (cache.capture.is_on(), Seen::default());
+    let make = || Made { cache, ask, lobes, rule, brute_force, seen: Seen::default() };
+    let mut captured = cache.capture.is_on().then(make);
     let mut found = |index: u32, probability| {
         let id = cache.storage.id(index);
-        if captured {
-            seen.add(id, probability);
+        if let Some(made) = &mut captured {
+            made.seen.add(id, probability);
         }
         visit(HrrHit { id, probability });
     };
-    if options.brute_force {
+    if brute_force {
         query_brute_force(bvh, &inner, counters, &mut found);
     } else {
-        query(bvh, &inner, counters, &mut found);
+        roulette::query(bvh, &inner, counters, &mut found);
     }
-    if captured {
-        let Options { rule, brute_force } = options;
-        cache.capture.record(&Made { cache, ask, lobes, rule, brute_force, seen });
+    if let Some(made) = &captured {
+        cache.capture.record(made);
     }
     Ok(())
 }
 
 /// What the calls for one query have in common.
-struct Asked<'a> {
-    cache: &'a HrrCache,
-    ask: HrrQuery,
-    options: Options,
-    counters: Option<Out<HrrCounters>>,
+pub(super) struct Asked<'a> {
+    pub cache: &'a HrrCache,
+    pub query: *const HrrQuery,
+    pub options: Options,
+    pub counters: Option<Out<HrrCounters>>,
 }
 
 impl Asked<'_> {
     #[inline(always)]
-    unsafe fn read(
+    pub unsafe fn read(
         cache: *const HrrCache,
         query: *const HrrQuery,
         options: *const HrrQueryOptions,
@@ -211,7 +239,7 @@ impl Asked<'_> {
         unsafe {
             Ok(Self {
                 cache: pointer::object(cache, "cache")?,
-                ask: pointer::copy(query, "query")?,
+                query: pointer::given(query, "query")?,
                 options: Options::read(options)?,
                 counters: Out::optional(counters, "counters")?,
             })
@@ -219,39 +247,42 @@ impl Asked<'_> {
     }
 }
 
-/// The room that a host has for hits, and how many there are.
+/// The room that a host has for hits, how many there are, and where that is to be said.
 pub(super) struct Hits {
-    room: Option<Out<HrrHit>>,
+    room: Out<HrrHit>,
     capacity: u64,
     count: u64,
+    out_count: Out<u64>,
 }
 
 impl Hits {
     #[inline(always)]
-    pub unsafe fn new(hits: *mut HrrHit, capacity: u64) -> Outcome<Self> {
+    pub unsafe fn new(hits: *mut HrrHit, capacity: u64, out_count: *mut u64) -> Outcome<Self> {
         // SAFETY: passed on.
-        let room = if capacity == 0 { None } else { Some(unsafe { Out::new(hits, "hits") }?) };
-        Ok(Self { room, capacity, count: 0 })
+        unsafe {
+            let room = Out::array(hits, usize::try_from(capacity).unwrap_or(usize::MAX), "hits")?;
+            Ok(Self { room, capacity, count: 0, out_count: Out::new(out_count, "out_count")? })
+        }
     }
 
     /// Writes a hit where there is room for it.
     #[inline(always)]
     pub fn push(&mut self, hit: HrrHit) {
-        if let Some(room) = self.room.as_ref().filter(|_| self.count < self.capacity) {
+        if self.count < self.capacity {
             // SAFETY: below the capacity, which the caller of `new` vouches for.
-            unsafe { room.write_at(self.count as usize, hit) };
+            unsafe { self.room.write_at(self.count as usize, hit) };
         }
         self.count += 1;
     }
 
     /// Says how many there are; fails when there is no room for them.
     #[inline(always)]
-    pub fn finish(self, out_count: Out<u64>) -> Outcome {
+    pub fn finish(self) -> Outcome {
         #[cold]
         fn too_many(count: u64, capacity: u64) -> Failure {
             Failure::new(HRR_ERROR_BUFFER_TOO_SMALL, format!("{count} hits, capacity is {capacity}"))
         }
-        out_count.write(self.count);
+        self.out_count.write(self.count);
         if self.count > self.capacity { Err(too_many(self.count, self.capacity)) } else { Ok(()) }
     }
 }
@@ -285,12 +316,11 @@ pub unsafe extern "C" fn hrr_query(
         let mut did = QueryCounters::default();
         // SAFETY: this module's contract.
         unsafe {
-            let Asked { cache, ask, options, counters } = Asked::read(cache, query, options, counters)?;
-            let mut hits = Hits::new(hits, capacity)?;
-            let out_count = Out::new(out_count, "out_count")?;
-            run(cache, ask, options, &mut did, |hit| hits.push(hit))?;
+            let Asked { cache, query, options, counters } = Asked::read(cache, query, options, counters)?;
+            let mut hits = Hits::new(hits, capacity, out_count)?;
+            run(cache, query, options, &mut did, |hit| hits.push(hit))?;
             add(counters, &did);
-            hits.finish(out_count)
+            hits.finish()
         }
     })
 }
@@ -313,10 +343,10 @@ pub unsafe extern "C" fn hrr_query_visit(
         let mut did = QueryCounters::default();
         // SAFETY: this module's contract.
         unsafe {
-            let Asked { cache, ask, options, counters } = Asked::read(cache, query, options, counters)?;
+            let Asked { cache, query, options, counters } = Asked::read(cache, query, options, counters)?;
             let visit = visit.ok_or_else(|| Failure::argument("visit is NULL"))?;
             let mut answer = 0;
-            run(cache, ask, options, &mut did, |hit| {
+            run(cache, query, options, &mut did, |hit| {
                 if answer == 0 {
                     answer = visit(user, &hit);
                 }

@@ -4,7 +4,7 @@ use super::cache::HrrCache;
 use super::geometry::HrrGeometry;
 use super::pointer::{self, Out, Strided};
 use super::points::Points;
-use super::query::{Hits, HrrCounters, HrrHit, HrrQuery, HrrQueryOptions, Options, add, run};
+use super::query::{Asked, Hits, HrrCounters, HrrHit, HrrQuery, HrrQueryOptions, add, run};
 use super::status::{Failure, HrrStatus, Outcome, guard};
 use crate::geometry::SurfacePoint;
 use crate::roulette::QueryCounters;
@@ -80,28 +80,42 @@ fn ray(geometry: &HrrGeometry, ray: &HrrRay, name: impl Fn() -> String) -> Outco
     Ok(Ray { origin, direction, t_min, t_max })
 }
 
-/// Does something with each ray of a host's and writes what comes of it.
+/// Does something with each of a host's things and writes what comes of it.
+unsafe fn each<T: Copy, U>(
+    (things, stride, name): (*const T, usize, &str),
+    count: u64,
+    (out, out_name): (*mut U, &str),
+    make: impl Fn(usize, T) -> Outcome<U>,
+) -> Outcome {
+    // SAFETY: the caller vouches for `count` of both.
+    unsafe {
+        let count = usize::try_from(count).unwrap_or(usize::MAX);
+        let things = Strided::new(things, stride, count, name)?;
+        let out = Out::array(out, count, out_name)?;
+        for i in 0..count {
+            out.write_at(i, make(i, things.get(i))?);
+        }
+    }
+    Ok(())
+}
+
+/// Does something with each ray.
 unsafe fn each_ray<T>(
     geometry: *const HrrGeometry,
     rays: *const HrrRay,
     ray_stride: usize,
     ray_count: u64,
-    (out, name): (*mut T, &str),
+    out: (*mut T, &str),
     trace: impl Fn(&HrrGeometry, &Ray) -> T,
 ) -> HrrStatus {
     guard(|| {
         // SAFETY: this module's contract, which the callers pass on.
         unsafe {
             let geometry = pointer::object(geometry, "geometry")?;
-            let count = usize::try_from(ray_count).unwrap_or(usize::MAX);
-            let rays = Strided::new(rays, ray_stride, count, "rays")?;
-            let out = Out::array(out, count, name)?;
-            for i in 0..count {
-                let ray = ray(geometry, &rays.get(i), || format!("rays[{i}]"))?;
-                out.write_at(i, trace(geometry, &ray));
-            }
+            each((rays, ray_stride, "rays"), ray_count, out, |i, given| {
+                Ok(trace(geometry, &ray(geometry, &given, || format!("rays[{i}]"))?))
+            })
         }
-        Ok(())
     })
 }
 
@@ -250,14 +264,9 @@ pub unsafe extern "C" fn hrr_occluded_hits(
         // SAFETY: this module's contract.
         unsafe {
             let scenery = Scenery::new(geometry, pointer::vector(eye, "eye")?, eye_normal, lights)?;
-            let count = usize::try_from(hit_count).unwrap_or(usize::MAX);
-            let hits = Strided::new(hits, 0, count, "hits")?;
-            let out = Out::array(out_occluded, count, "out_occluded")?;
-            for i in 0..count {
-                out.write_at(i, u8::from(scenery.occluded(hits.get(i).id)?));
-            }
+            let out = (out_occluded, "out_occluded");
+            each((hits, 0, "hits"), hit_count, out, |_, hit| Ok(u8::from(scenery.occluded(hit.id)?)))
         }
-        Ok(())
     })
 }
 
@@ -282,15 +291,12 @@ pub unsafe extern "C" fn hrr_query_visible(
     guard(|| {
         // SAFETY: this module's contract.
         unsafe {
-            let cache = pointer::object(cache, "cache")?;
-            let ask = pointer::copy(query, "query")?;
-            let options = Options::read(options)?;
-            let scenery = Scenery::new(geometry, DVec3::from_array(ask.position), eye_normal, lights)?;
-            let mut hits = Hits::new(hits, capacity)?;
-            let out_count = Out::new(out_count, "out_count")?;
-            let counters = Out::optional(counters, "counters")?;
+            let Asked { cache, query, options, counters } = Asked::read(cache, query, options, counters)?;
+            let eye = DVec3::from_array((&raw const (*query).position).read_unaligned());
+            let scenery = Scenery::new(geometry, eye, eye_normal, lights)?;
+            let mut hits = Hits::new(hits, capacity, out_count)?;
             let (mut did, mut failure) = (QueryCounters::default(), None);
-            run(cache, ask, options, &mut did, |hit| match scenery.occluded(hit.id) {
+            run(cache, query, options, &mut did, |hit| match scenery.occluded(hit.id) {
                 Ok(true) => {}
                 Ok(false) => hits.push(hit),
                 Err(e) => failure = failure.take().or(Some(e)),
@@ -299,7 +305,7 @@ pub unsafe extern "C" fn hrr_query_visible(
                 return Err(failure);
             }
             add(counters, &did);
-            hits.finish(out_count)
+            hits.finish()
         }
     })
 }

@@ -101,7 +101,7 @@ fn query(cache: &HrrCache, from: &mut Reader<'_>, counts: &mut HrrCapture) -> Ou
     let (mut seen, mut did) = (Seen::default(), QueryCounters::default());
     let start = std::time::Instant::now();
     // SAFETY: the lobes live until the end.
-    unsafe { run(cache, ask, options, &mut did, |hit| seen.add(hit.id, hit.probability)) }?;
+    unsafe { run(cache, &ask, options, &mut did, |hit| seen.add(hit.id, hit.probability)) }?;
     counts.seconds += start.elapsed().as_secs_f64();
     counts.queries += 1;
     counts.differences += u64::from(seen != expected);

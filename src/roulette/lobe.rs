@@ -31,7 +31,13 @@ impl Lobe {
         let bounded = |alpha: f64| if alpha > MIN_ALPHA { alpha.min(1.0) } else { MIN_ALPHA }; // NaN too
         let (alpha_x, alpha_y) = (bounded(alpha_x), bounded(alpha_y));
         let weight = if weight.is_finite() { weight.max(0.0) } else { 0.0 };
-        let a = alpha_x.max(alpha_y);
+        Self::within_bounds(frame, alpha_x, alpha_y, weight)
+    }
+
+    /// [`Lobe::new`] of numbers that are known to be within their bounds.
+    #[inline(always)]
+    pub(crate) fn within_bounds(frame: Frame, alpha_x: f64, alpha_y: f64, weight: f64) -> Self {
+        let a = if alpha_x > alpha_y { alpha_x } else { alpha_y };
         Self { frame, alpha_x, alpha_y, a2: a * a, inv_x: 1.0 / alpha_x, inv_y: 1.0 / alpha_y, weight }
     }
 

@@ -221,7 +221,7 @@ fn counts_and_strides() {
 #[test]
 fn estimates_are_upper_bounds() {
     let context = Context::new(1);
-    for n in [1, 100, 50_000] {
+    for n in [1, 100, size(50_000, 300)] {
         let cache = context.floats(&vec![[1.0, 2.0, 3.0]; n]);
         let info = cache.info();
         assert!(info.bytes <= hrr_cache_estimate_bytes(n as u64, 0) && info.bytes >= 24 * n as u64);
@@ -399,7 +399,10 @@ fn handles_are_counted() {
         hrr_context_retain(context.0);
         hrr_context_release(context.0);
         hrr_cache_release(cache.0);
-        assert_eq!(hrr_self_test(context.0, 3), HRR_OK, "{}", last_error());
+        // Half a million probabilities are too many for Miri.
+        if !cfg!(miri) {
+            assert_eq!(hrr_self_test(context.0, 3), HRR_OK, "{}", last_error());
+        }
     }
     // A cache outlives its context.
     drop(context);
@@ -460,8 +463,8 @@ fn names_and_versions() {
     assert!(version.starts_with(concat!("hrr ", env!("CARGO_PKG_VERSION"))), "{version}");
     assert_eq!(version.contains("embree"), cfg!(feature = "embree"));
     assert_eq!(hrr_version() >> 16, env!("CARGO_PKG_VERSION_MAJOR").parse::<u32>().unwrap());
-    let keys: std::collections::HashSet<_> = (0..1000)
+    let keys: std::collections::HashSet<_> = (0..size(1000, 50))
         .flat_map(|i| [hrr_key(1, i, 0, 0), hrr_key(1, 0, i + 1, 0), hrr_key(1, 0, 0, i + 1)])
         .collect();
-    assert_eq!(keys.len(), 3000);
+    assert_eq!(keys.len(), size(3000, 150));
 }

@@ -64,14 +64,15 @@ fn memory_is_told_and_adds_up() {
         let context = context(&host, 0);
         let held = || host.held.load(Ordering::SeqCst);
         assert_eq!((held(), info(&context).threads), (0, 2));
-        let cache = context.floats(&sheet(10_000));
+        let n = size(10_000, 150);
+        let cache = context.floats(&sheet(n));
         // Positions and boxes, ids; the build's buffers are kept for the next one.
-        assert!(held() >= 10_000 * (16 + 8) && held() as u64 >= cache.info().bytes, "{}", held());
+        assert!(held() >= i64::from(n) * (16 + 8) && held() as u64 >= cache.info().bytes, "{}", held());
         assert_eq!(info(&context).bytes, held() as u64);
-        let (first, estimate) = (held(), hrr_cache_estimate_bytes(10_000, 0) as i64);
+        let (first, estimate) = (held(), hrr_cache_estimate_bytes(n.into(), 0) as i64);
         assert!(first <= estimate && host.most.load(Ordering::SeqCst) == estimate);
         assert_eq!(info(&context).peak_bytes, estimate as u64);
-        let second = context.floats(&sheet(10_000));
+        let second = context.floats(&sheet(n));
         assert!(held() > first);
         drop(cache);
         drop(second);
@@ -79,14 +80,14 @@ fn memory_is_told_and_adds_up() {
         assert!(kept > 0 && kept < 2 * estimate);
         // What is kept is enough: nothing new is asked for.
         host.limit.store(estimate, Ordering::SeqCst);
-        let third = context.floats(&sheet(5000));
+        let third = context.floats(&sheet(n / 2));
         drop(third);
         // SAFETY: live.
         assert_eq!(unsafe { hrr_context_trim(context.0) }, HRR_OK);
         assert_eq!(held(), 0);
         let (cache, small) = (context.floats(&sheet(100)), held());
         host.limit.store(small + 1000, Ordering::SeqCst);
-        let points = sheet(10_000);
+        let points = sheet(n);
         let segments = [floats(&points)];
         assert_eq!(context.build(&build_desc(&segments)).unwrap_err(), HRR_ERROR_OUT_OF_MEMORY);
         assert!(last_error().contains("refused"), "{}", last_error());
@@ -139,7 +140,7 @@ unsafe extern "C" fn until(user: *mut c_void, done: f64) -> i32 {
 #[test]
 fn progress_rises_and_ends_builds() {
     let context = Context::new(2);
-    let points = sheet(200_000);
+    let points = sheet(size(200_000, 60));
     let segments = [floats(&points)];
     let build = |limit: u64| {
         let numbers: [AtomicU64; 3] = [limit.into(), 0.into(), 0.into()];
@@ -150,7 +151,7 @@ fn progress_rises_and_ends_builds() {
         (built, last.load(Ordering::SeqCst), calls.load(Ordering::SeqCst))
     };
     let (whole, last, calls) = build(u64::MAX);
-    assert!(last == 1000 && calls > 6, "{last} {calls}");
+    assert!(last == 1000 && calls > size(6, 2), "{last} {calls}");
     let plain = context.build(&build_desc(&segments)).unwrap().hash();
     assert_eq!(whole, Ok(plain));
     for limit in [0, 1, 100, 300, 1000] {

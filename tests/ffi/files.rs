@@ -46,7 +46,7 @@ fn saved_caches_are_loaded_as_they_were() {
     let directory = tempfile::tempdir().unwrap();
     let path = directory.path().join("a cäche");
     let (one, other) = (Context::new(1), Context::new(2));
-    for cache in [rich(&one, 5000), one.floats(&points(777)), one.floats(&[])] {
+    for cache in [rich(&one, size(5000, 60)), one.floats(&points(size(777, 20))), one.floats(&[])] {
         // SAFETY: live, and a text.
         assert_eq!(unsafe { hrr_cache_save(cache.0, text(&path).as_ptr()) }, HRR_OK, "{}", last_error());
         let loaded = load(&other, &path).unwrap();
@@ -63,7 +63,7 @@ fn saved_caches_are_loaded_as_they_were() {
             assert_eq!(loaded.hits(&ask, None), cache.hits(&ask, None));
             found += cache.hits(&ask, None).len();
         }
-        assert!(found > 10 || a.vertex_count == 0, "{found}");
+        assert!(found > size(10, 1) || a.vertex_count == 0, "{found}");
     }
 }
 
@@ -72,12 +72,13 @@ fn damaged_files_are_refused() {
     let directory = tempfile::tempdir().unwrap();
     let path = directory.path().join("cache");
     let context = Context::new(1);
-    let cache = rich(&context, 60);
+    let cache = rich(&context, size(60, 3));
     // SAFETY: live, and a text.
     assert_eq!(unsafe { hrr_cache_save(cache.0, text(&path).as_ptr()) }, HRR_OK);
     let good = fs::read(&path).unwrap();
     let mut refused = 0;
-    for at in 0..good.len() {
+    let places = (0..good.len()).step_by(size(1, 25));
+    for at in places.clone() {
         for flip in [1u8, 0x80] {
             let mut bad = good.clone();
             bad[at] ^= flip;
@@ -93,7 +94,7 @@ fn damaged_files_are_refused() {
             }
         }
     }
-    assert_eq!(refused, 2 * (good.len() - 8));
+    assert_eq!(refused, 2 * places.filter(|at| !(24..32).contains(at)).count());
     for length in [0, 7, 8, 40, good.len() - 1] {
         fs::write(&path, &good[..length]).unwrap();
         assert_eq!(load(&context, &path).unwrap_err(), HRR_ERROR_IO);
@@ -138,19 +139,19 @@ fn captures_hold_what_was_asked_and_found() {
     let directory = tempfile::tempdir().unwrap();
     let path = directory.path().join("capture");
     let (context, other) = (Context::new(2), Context::new(1));
-    let (first, second) = (rich(&context, 3000), context.floats(&points(2000)));
+    let (first, second) = (rich(&context, size(3000, 40)), context.floats(&points(size(2000, 30))));
     let foreign = other.floats(&points(10));
     let lobes = [sphere(1.0), HrrLobe { alpha_x: 0.01, alpha_y: 0.1, ..sphere(3.0) }];
     let near = |cache: &Cache, key| query(cache.info().bounds_min.map(|x| x + 0.01), &lobes, 1e-2, key);
     let ask_all = || {
         let mut found = 0;
-        for key in 0..20 {
+        for key in 0..size(20, 1) {
             found += first.hits(&HrrQuery { mask: 3, ..near(&first, key) }, None).len();
             for (rule, brute) in [(0, true), (1, false), (2, false)] {
                 found += second.hits(&near(&second, key), Some(&options(rule, brute))).len();
             }
         }
-        let queries: Vec<_> = (0..30).map(|key| near(&second, key)).collect();
+        let queries: Vec<_> = (0..size(30, 2)).map(|key| near(&second, key)).collect();
         second.batch(&context, &queries);
         // Of another context: not captured.
         foreign.hits(&near(&foreign, 1), None);
@@ -163,13 +164,13 @@ fn captures_hold_what_was_asked_and_found() {
     assert_eq!(ask_all(), found);
     let written = end(&context).unwrap();
     // A batch for its size, and one into the buffer.
-    assert_eq!((written.caches, written.queries, written.left_out), (2, 20 * 4 + 2 * 30, 0));
+    assert_eq!((written.caches, written.queries, written.left_out), (2, size(20 * 4 + 2 * 30, 4 + 2 * 2), 0));
     assert_eq!(written.bytes, fs::metadata(&path).unwrap().len());
     ask_all();
     assert_eq!(written.bytes, fs::metadata(&path).unwrap().len());
     let made = replay(&other, &path).unwrap();
     assert_eq!((made.caches, made.queries, made.differences), (2, written.queries, 0));
-    assert!(found > 500, "{found}");
+    assert!(found > size(500, 5), "{found}");
 
     // Another number of hits in the file is a difference, another anything in the cache is damage.
     let good = fs::read(&path).unwrap();
@@ -178,7 +179,7 @@ fn captures_hold_what_was_asked_and_found() {
     bad[cache_end + 8 + 24] ^= 1;
     fs::write(&path, &bad).unwrap();
     assert_eq!(replay(&other, &path).unwrap().differences, 1);
-    for at in (0..cache_end).step_by(97).chain([8, 12, cache_end, cache_end + 4]) {
+    for at in (0..cache_end).step_by(size(97, 400)).chain([8, 12, cache_end, cache_end + 4]) {
         let mut bad = good.clone();
         bad[at] ^= 0x40;
         fs::write(&path, &bad).unwrap();
@@ -195,7 +196,7 @@ fn captures_hold_what_was_asked_and_found() {
     assert_eq!(begin(&context, &path, room), HRR_OK);
     ask_all();
     let short = end(&context).unwrap();
-    assert!(short.left_out > 60 && short.queries > 2 && short.bytes <= room, "{short:?}");
+    assert!(short.left_out > size(60, 6) && short.queries >= size(3, 1) && short.bytes <= room, "{short:?}");
     assert_eq!(replay(&other, &path).unwrap().queries, short.queries);
     assert_eq!(begin(&context, directory.path(), 0), HRR_ERROR_IO);
     assert_eq!(end(&context).unwrap_err(), HRR_ERROR_INVALID_STATE);

@@ -85,7 +85,7 @@ fn rays_hit_what_they_hit_in_rust() {
     if cfg!(feature = "embree") {
         backends.push((HRR_BACKEND_EMBREE, Backend::Embree));
     }
-    let rays = rays(2000);
+    let rays = rays(size(2000, 20));
     for (number, backend) in backends {
         let geometry = build(&context, &HrrGeometryDesc { backend: number, ..desc(&meshes) }).unwrap();
         let own = visibility::build(backend, &whole, 1).unwrap();
@@ -112,7 +112,8 @@ fn rays_hit_what_they_hit_in_rust() {
                 }
             }
         }
-        assert!(met > 300 && met < 1990 && meshes_met[1] == 0 && meshes_met[3] > 0, "{met} {meshes_met:?}");
+        assert!(met > size(300, 2) && met < size(1990, 20), "{met}");
+        assert!(meshes_met[1] == 0 && meshes_met[3] >= size(1, 0), "{meshes_met:?}");
     }
 }
 
@@ -221,9 +222,11 @@ fn bad_geometry_is_refused() {
     let good = mesh(&positions, &indices);
     let bad = HRR_ERROR_INVALID_ARGUMENT;
     let refuse = |change: &dyn Fn(&mut HrrMesh, &mut HrrGeometryDesc)| {
-        let mut meshes = [good, good];
+        // In two steps: a pointer to the meshes does not outlive their change.
+        let (mut meshes, mut scratch) = ([good, good], desc(&[]));
+        change(&mut meshes[1], &mut scratch);
         let mut description = desc(&meshes);
-        change(&mut meshes[1], &mut description);
+        change(&mut { good }, &mut description);
         build(&context, &description).map(|_| ()).err().unwrap_or(HRR_OK)
     };
     assert_eq!(refuse(&|_, _| ()), HRR_OK);
