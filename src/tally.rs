@@ -24,7 +24,7 @@ pub struct Tally {
     pub merged: u64,
     /// Seconds tracing light subpaths, their connections to the camera included.
     pub light_trace: f64,
-    /// Seconds by the clock on the wall until the eye side began, and of the eye side.
+    /// Seconds by the clock on the wall until the eye side began, and of the eye side if it took all samples that were planned.
     pub sides: [f64; 2],
     /// Seconds building the vertex BVH.
     pub vertex_bvh_build: f64,

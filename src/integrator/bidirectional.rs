@@ -196,8 +196,8 @@ impl Integrator for Bidirectional<'_> {
         tally.sides[0] = start.elapsed().as_secs_f64();
         let start = Instant::now();
         let on_eye_side = |fraction| progress(LIGHT_SHARE + (1.0 - LIGHT_SHARE) * fraction);
-        self.eye_pass(iteration, film, &on_eye_side, &mut tally);
-        tally.sides[1] = start.elapsed().as_secs_f64();
+        let whole = self.eye_pass(iteration, film, &on_eye_side, &mut tally);
+        tally.sides[1] = start.elapsed().as_secs_f64() * whole;
         if let Some(adaptive) = &mut self.adaptive {
             adaptive.moderate(&tally);
         }

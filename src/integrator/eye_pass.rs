@@ -16,14 +16,15 @@ use crate::tally::{Clock, Tally};
 use crate::visibility::Ray;
 
 impl Bidirectional<'_> {
-    /// The eye pass of an iteration, and what it needs to know of the light pass before.
+    /// The eye pass of an iteration, and what it needs to know of the light pass before; how many samples were planned over
+    /// those that there was time for.
     pub(super) fn eye_pass(
         &mut self,
         iteration: u64,
         film: &Film,
         progress: &(dyn Fn(f64) + Sync),
         tally: &mut Tally,
-    ) {
+    ) -> f64 {
         let key = (self.settings.seed, iteration, self.size.samples);
         let records = self.recipe.base == Base::Probabilistic;
         let of = match self.deadline {
@@ -61,6 +62,7 @@ impl Bidirectional<'_> {
         if let Some(apart) = &apart {
             film.add_scaled(apart, parts.scale());
         }
+        parts.scale()
     }
 
     /// What an eye sample sees.
