@@ -25,7 +25,7 @@ use hrr::film::Film;
 use hrr::math::luminance;
 use hrr::render::counters::processor_seconds;
 use hrr::scene::Scene;
-use hrr::settings::{AutoSwitch, Heuristic, Integrator, Settings, Switch};
+use hrr::settings::{AutoSwitch, Heuristic, Integrator, Settings};
 use hrr::subpath::World;
 use hrr::visibility::{Hit, Ray, Visibility};
 use std::path::Path;
