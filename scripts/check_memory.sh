@@ -97,7 +97,7 @@ miri_() {
     cargo +nightly miri --version >/dev/null 2>&1 || { missing miri "nightly toolchain with miri" && return; }
     # Tree borrows: under stacked ones, crossbeam-epoch 0.9 finds its list's nodes by pointers to their links, which is
     # not allowed there. Leaks are valgrind's: that list lives until the end. Sines and powers as they are, since tests
-    # compare bits. Left out: what starts compilers, what counts a million vertices, and whole renders. Many minutes.
+    # compare bits. Left out: what starts compilers, what counts a million vertices, and whole renders. Some twelve minutes.
     MIRIFLAGS="-Zmiri-disable-isolation -Zmiri-tree-borrows -Zmiri-ignore-leaks -Zmiri-deterministic-floats" \
         cargo +nightly miri test --no-default-features --test main ffi:: -- \
         --skip ffi::header --skip ffi::programs --skip ffi::installed --skip ffi::allocations --skip ffi::renders
