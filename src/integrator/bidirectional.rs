@@ -14,7 +14,7 @@ use crate::light_cache::LightCache;
 use crate::roulette::Pregenerated;
 use crate::sampler::Stream;
 use crate::scene::Scene;
-use crate::settings::{AutoSwitch, Settings};
+use crate::settings::Settings;
 use crate::subpath::{Storing, World};
 use crate::tally::Tally;
 use crate::techniques::{Merging, Numerics, Roulette, Techniques};
@@ -83,12 +83,7 @@ impl<'a> Bidirectional<'a> {
     /// Whether light subpaths follow what a pre-pass found useful. What merging finds is on all surfaces, and noisier where
     /// fewer of them go.
     fn is_guided(&self) -> bool {
-        self.recipe.roulette
-            && match self.settings.guiding {
-                AutoSwitch::Off => false,
-                AutoSwitch::On => true,
-                AutoSwitch::Auto => !self.recipe.merging,
-            }
+        self.recipe.roulette && self.settings.guiding.is_on(|| !self.recipe.merging)
     }
 
     /// Sets how often each technique tries, per eye sample.

@@ -12,7 +12,6 @@ use crate::light::LightPoint;
 use crate::math::Spectrum;
 use crate::roulette::{self, Query};
 use crate::sampler::{Family, Purpose, Sampler, Stream};
-use crate::settings::AutoSwitch;
 use crate::subpath::World;
 use crate::tally::{Clock, Tally};
 use crate::techniques::EmitterRoulette;
@@ -53,11 +52,7 @@ fn draw(world: &World<'_>, sampler: &Sampler) -> Option<LightPoint> {
 impl Bidirectional<'_> {
     /// How the roulette judges points of lights; `None` where it does not.
     pub(super) fn plan_emitters(&self) -> Option<EmitterRoulette> {
-        let wanted = match self.settings.emitters {
-            AutoSwitch::Off => false,
-            AutoSwitch::On => true,
-            AutoSwitch::Auto => self.world.lights.near_count() >= MANY,
-        };
+        let wanted = self.settings.emitters.is_on(|| self.world.lights.near_count() >= MANY);
         if !(wanted && self.recipe.roulette && self.recipe.next_event) {
             return None;
         }

@@ -185,6 +185,17 @@ choice! {
     }
 }
 
+impl AutoSwitch {
+    /// Whether it is done, where `helps` tells whether it is known to help.
+    pub fn is_on(self, helps: impl FnOnce() -> bool) -> bool {
+        match self {
+            Self::Off => false,
+            Self::On => true,
+            Self::Auto => helps(),
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
