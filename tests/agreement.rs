@@ -161,7 +161,8 @@ fn growing_and_adapting_keep_the_mean() {
         "caustic_mirror",
         &[("film.width", "40"), ("film.height", "32"), ("material.mirror.alpha", "0.05")],
     );
-    for integrator in [Integrator::Pt, Integrator::Lvc, Integrator::LvcHrr, Integrator::PcbptHrr] {
+    use Integrator::{Bpt, Lvc, LvcHrr, PcbptHrr, Pt};
+    for integrator in [Pt, Bpt, Lvc, LvcHrr, PcbptHrr] {
         let fixed = run(&scene, integrator, 1, 96, 12);
         let growing = estimate_of(&scene, 48, 8, |seed| {
             let settings = Settings {

@@ -168,7 +168,8 @@ impl Integrator for Bidirectional<'_> {
     }
 
     fn finish_by(&mut self, deadline: Instant) {
-        self.deadline = Some(deadline);
+        // Each eye sample has a light subpath of its own: there are no more of them than planned.
+        self.deadline = (self.recipe.base != Base::OwnPath).then_some(deadline);
     }
 
     fn iterate(&mut self, iteration: u64, film: &mut Film, progress: &(dyn Fn(f64) + Sync)) -> Result<Tally> {

@@ -4,15 +4,18 @@ use super::blur::Blur;
 use super::bootstrap::Interval;
 use super::results::{Results, Row};
 use crate::math::relative::median;
+use std::collections::BTreeMap;
 
 /// Rungs that the longest is predicted from.
 const FITTED: usize = 4;
+/// Squares of errors with all pixels, over those without the worst thousandth, from which on rare samples make them.
+const RARE: f64 = 10.0;
 
-/// A point of a setting's curve: all runs after as many iterations.
+/// A point of a setting's curve: all runs up to a rung.
 #[derive(Debug, Clone)]
 pub struct Rung {
-    /// Iterations.
-    pub iterations: u64,
+    /// Iterations of the median run.
+    pub iterations: f64,
     /// Median wall-clock seconds.
     pub seconds: f64,
     /// Error: the root of the mean of the runs' squares.
@@ -41,14 +44,20 @@ pub struct Curve {
     pub biased: bool,
     /// Runs.
     pub runs: usize,
-    /// Its rungs, by iterations.
+    /// Its rungs, the longest last.
     pub rungs: Vec<Rung>,
     /// Seconds to an error of 1 (100 %), which noise halves in four times the time: variance times seconds.
     pub unit: Interval,
     /// That of the first setting over it: how many times as fast this one is.
     pub speedup: Interval,
-    /// From the rungs below the longest; `None` when there are too few: two for noise, four for blur.
+    /// Error at the longest rung with all pixels counted, and how many times as fast to it this setting is as the first.
+    pub whole: (Interval, Interval),
+    /// From the rungs below the longest; `None` when there are too few, two for noise, four for blur, or when it is
+    /// [`Curve::rare`].
     pub prediction: Option<Prediction>,
+    /// Whether the rungs below the longest have rare bright samples that make most of the error of all pixels: shorter runs
+    /// do not tell what longer ones find.
+    pub rare: bool,
     /// Noise and blur of a setting that blurs, from all rungs.
     pub blur: Option<Blur>,
     /// Median FLIP at the longest rung.
@@ -70,47 +79,56 @@ impl Curve {
 
 /// The rows of a setting, by rung and run.
 struct Table<'a> {
-    rungs: Vec<(u64, Vec<&'a Row>)>,
+    rungs: Vec<Vec<&'a Row>>,
     runs: usize,
 }
 
 impl<'a> Table<'a> {
     fn new(results: &'a Results, name: &str) -> Self {
-        let mut rungs: Vec<(u64, Vec<&Row>)> = Vec::new();
+        let mut rungs: BTreeMap<u32, Vec<&Row>> = BTreeMap::new();
         for row in results.rows.iter().filter(|r| r.setting == name) {
-            match rungs.iter_mut().find(|(n, _)| *n == row.iterations) {
-                Some((_, rows)) => rows.push(row),
-                None => rungs.push((row.iterations, vec![row])),
-            }
+            rungs.entry(row.rung).or_default().push(row);
         }
-        rungs.sort_by_key(|(n, _)| *n);
-        let runs = rungs.iter().map(|(_, rows)| rows.len()).min().unwrap_or(0);
+        let rungs: Vec<Vec<&Row>> = rungs.into_values().collect();
+        let runs = rungs.iter().map(Vec::len).min().unwrap_or(0);
         Self { rungs, runs }
     }
 
     fn mean(&self, rung: usize, runs: &[usize], value: impl Fn(&Row) -> f64) -> f64 {
-        runs.iter().map(|&r| value(self.rungs[rung].1[r])).sum::<f64>() / runs.len() as f64
+        runs.iter().map(|&r| value(self.rungs[rung][r])).sum::<f64>() / runs.len() as f64
+    }
+
+    /// Of all runs.
+    fn median(&self, rung: usize, value: impl Fn(&Row) -> f64) -> f64 {
+        median(&mut self.rungs[rung].iter().map(|r| value(r)).collect::<Vec<_>>())
+    }
+
+    /// Median seconds of all runs, without those of the pre-passes.
+    fn own_seconds(&self, rung: usize) -> f64 {
+        self.median(rung, |r| r.seconds - r.setup).max(f64::MIN_POSITIVE)
     }
 
     /// The median run's seconds: a run that another program held up does not count.
     fn seconds(&self, rung: usize, runs: &[usize]) -> f64 {
-        median(&mut runs.iter().map(|&r| self.rungs[rung].1[r].seconds).collect::<Vec<_>>())
+        median(&mut runs.iter().map(|&r| self.rungs[rung][r].seconds).collect::<Vec<_>>())
     }
 
     /// Variance of the error times seconds, at the longest rung.
-    fn unit(&self, runs: &[usize]) -> f64 {
+    fn unit(&self, runs: &[usize], square: impl Fn(&Row) -> f64) -> f64 {
         let last = self.rungs.len() - 1;
-        self.mean(last, runs, |r| r.square).max(0.0) * self.seconds(last, runs)
+        self.mean(last, runs, square).max(0.0) * self.seconds(last, runs)
     }
 
     /// Iterations and square errors of the rungs below one.
     fn points(&self, below: usize, runs: &[usize]) -> Vec<(f64, f64)> {
-        (0..below).map(|k| (self.rungs[k].0 as f64, self.mean(k, runs, |r| r.square))).collect()
+        (0..below)
+            .map(|k| (self.median(k, |r| r.iterations as f64), self.mean(k, runs, |r| r.square)))
+            .collect()
     }
 
     /// The line through the rungs below the longest, at most [`FITTED`]: intercept and slope of the logarithm of the
-    /// square error over that of the iterations. The slope of noise is -1 but for what is trimmed off, which is more where
-    /// few iterations leave rarer peaks.
+    /// square error over that of the seconds. The slope of noise is -1 but for what is trimmed off, which is more where
+    /// short runs leave rarer peaks, and but for iterations that grow with the time there is.
     fn fit(&self, runs: &[usize]) -> (f64, f64) {
         let below = self.rungs.len() - 1;
         let rungs = below.saturating_sub(FITTED)..below;
@@ -118,7 +136,7 @@ impl<'a> Table<'a> {
         let points: Vec<[f64; 2]> = rungs
             .map(|k| {
                 let square = self.mean(k, runs, |r| r.square).max(f64::MIN_POSITIVE);
-                [(self.rungs[k].0 as f64).ln(), square.ln()]
+                [self.own_seconds(k).ln(), square.ln()]
             })
             .collect();
         let mean = |i: usize| points.iter().map(|p| p[i]).sum::<f64>() / n;
@@ -141,33 +159,38 @@ fn curve(name: &str, table: &Table<'_>, first: &Table<'_>) -> Curve {
     let all: Vec<usize> = (0..n).collect();
     let rungs: Vec<Rung> = (0..table.rungs.len())
         .map(|k| Rung {
-            iterations: table.rungs[k].0,
+            iterations: table.median(k, |r| r.iterations as f64),
             seconds: table.seconds(k, &all),
             error: Interval::new(n, |runs| table.mean(k, runs, |r| r.square).max(0.0).sqrt()),
         })
         .collect();
     let last = rungs.len() - 1;
-    let biased = table.rungs[0].1[0].biased;
+    let biased = table.rungs[0][0].biased;
+    let mean = |value: fn(&Row) -> f64| (0..last).map(|k| table.mean(k, &all, value)).sum::<f64>();
+    let rare = mean(|r| r.whole) > RARE * mean(|r| r.square);
+    // Runs with the same number were interleaved: the machine was as busy.
+    let speedup = |square: fn(&Row) -> f64| {
+        Interval::new(n.min(first.runs), |runs| first.unit(runs, square) / table.unit(runs, square))
+    };
     Curve {
         name: name.to_owned(),
         biased,
         runs: n,
-        unit: Interval::new(n, |runs| table.unit(runs)),
-        // Runs with the same number were interleaved: the machine was as busy.
-        speedup: Interval::new(n.min(first.runs), |runs| first.unit(runs) / table.unit(runs)),
-        prediction: if biased {
-            predict_blur(table, &rungs)
-        } else {
-            (rungs.len() >= 3).then(|| predict(table, &rungs))
+        unit: Interval::new(n, |runs| table.unit(runs, |r| r.square)),
+        speedup: speedup(|r| r.square),
+        whole: (
+            Interval::new(n, |runs| table.mean(last, runs, |r| r.whole).max(0.0).sqrt()),
+            speedup(|r| r.whole),
+        ),
+        prediction: match (rare, biased) {
+            (true, _) => None,
+            (false, true) => predict_blur(table, &rungs),
+            (false, false) => (rungs.len() >= 3).then(|| predict(table, &rungs)),
         },
+        rare,
         blur: biased.then(|| Blur::fit(&table.points(rungs.len(), &all))).flatten(),
-        flip: median(&mut table.rungs[last].1.iter().map(|r| r.flip).collect::<Vec<_>>()),
-        cpu: table.rungs[last]
-            .1
-            .iter()
-            .map(|r| r.cpu)
-            .collect::<Option<Vec<_>>>()
-            .map(|mut s| median(&mut s)),
+        flip: table.median(last, |r| r.flip),
+        cpu: table.rungs[last].iter().map(|r| r.cpu).collect::<Option<Vec<_>>>().map(|mut s| median(&mut s)),
         stages: std::array::from_fn(|s| table.mean(last, &all, |r| r.stages[s])),
         fireflies: table.mean(last, &all, |r| r.fireflies as f64),
         rungs,
@@ -176,16 +199,16 @@ fn curve(name: &str, table: &Table<'_>, first: &Table<'_>) -> Curve {
 
 fn predict(table: &Table<'_>, rungs: &[Rung]) -> Prediction {
     let all: Vec<usize> = (0..table.runs).collect();
-    let iterations = rungs[rungs.len() - 1].iterations as f64;
+    let (longest, setup) = (table.own_seconds(rungs.len() - 1), table.median(0, |r| r.setup));
     let (intercept, slope) = table.fit(&all);
     extrapolate(
         table,
         rungs,
         |runs| {
             let (intercept, slope) = table.fit(runs);
-            (intercept + slope * iterations.ln()).exp()
+            (intercept + slope * longest.ln()).exp()
         },
-        |square| ((square.ln() - intercept) / slope).exp(),
+        |square| setup + ((square.ln() - intercept) / slope).exp(),
     )
 }
 
@@ -193,14 +216,15 @@ fn predict_blur(table: &Table<'_>, rungs: &[Rung]) -> Option<Prediction> {
     let last = rungs.len() - 1;
     let all: Vec<usize> = (0..table.runs).collect();
     let fitted = Blur::fit(&table.points(last, &all))?;
-    let iterations = rungs[last].iterations as f64;
+    let (iterations, setup) = (rungs[last].iterations, table.median(0, |r| r.setup));
+    let per_iteration = table.own_seconds(last - 1) / rungs[last - 1].iterations;
     let predicted = |runs: &[usize]| {
         Blur::fit(&table.points(last, runs)).map_or(f64::NAN, |blur| blur.square(iterations))
     };
-    Some(extrapolate(table, rungs, predicted, |square| fitted.iterations_to(square)))
+    Some(extrapolate(table, rungs, predicted, |square| setup + per_iteration * fitted.iterations_to(square)))
 }
 
-/// The longest rung as a model says: `predicted`, its square error from some runs; `needed`, iterations to a square error.
+/// The longest rung as a model says: `predicted`, its square error from some runs; `needed`, seconds to a square error.
 fn extrapolate(
     table: &Table<'_>,
     rungs: &[Rung],
@@ -218,11 +242,9 @@ fn extrapolate(
         (predicted(runs) * chance).max(0.0).sqrt()
     });
     let measured = rungs[last].error.value;
-    let setup = median(&mut table.rungs[below].1.iter().map(|r| r.setup).collect::<Vec<_>>());
-    let per_iteration = (rungs[below].seconds - setup) / rungs[below].iterations as f64;
     Prediction {
         error,
-        seconds: setup + per_iteration * needed(measured.powi(2).max(f64::MIN_POSITIVE)),
+        seconds: needed(measured.powi(2).max(f64::MIN_POSITIVE)),
         measured,
         measured_seconds: rungs[last].seconds,
     }
@@ -243,12 +265,14 @@ mod tests {
                     setting: setting.into(),
                     biased: false,
                     run: run as usize,
+                    rung: n.ilog2(),
                     iterations: n,
                     seconds: 0.5 + seconds * n as f64,
                     setup: 0.5,
                     cpu: Some(1.5),
                     flip: 0.25,
                     square: variance / n as f64 * (0.8 + 0.4 * u),
+                    whole: variance / n as f64 * (1.6 + 0.8 * u),
                     fireflies: 1,
                     stages: [1.0, 2.0, 3.0, 4.0, 5.0],
                 });
@@ -267,6 +291,10 @@ mod tests {
         assert!((a.unit.value - 16.5 / 16.0).abs() < 0.1 && a.unit.low < a.unit.value);
         assert!(b.speedup.holds(2.0) && !b.is_unresolved(), "{b:?}");
         assert!(a.is_unresolved());
+        // Twice the square with all pixels, of either.
+        assert!(
+            (b.whole.0.value / b.rungs[4].error.value - 2f64.sqrt()).abs() < 1e-9 && b.whole.1 == b.speedup
+        );
         // Of equals, one in ten pairs is told apart by chance.
         let equal = |key: u64| {
             let both = [rows("a", 1.0, 1.0, 2 * key), rows("b", 1.0, 1.0, 2 * key + 1)].concat();
@@ -274,6 +302,17 @@ mod tests {
         };
         let unresolved = (0..60).filter(|&key| equal(key)).count();
         assert!((45..60).contains(&unresolved), "{unresolved} of 60");
+    }
+
+    #[test]
+    fn what_rests_on_rare_samples_is_not_predicted() {
+        let mut lucky = rows("a", 1.0, 1.0, 5);
+        assert!(!curves(&Results { about: Vec::new(), rows: lucky.clone() })[0].rare);
+        for row in lucky.iter_mut().filter(|r| r.run == 3) {
+            row.whole *= 200.0;
+        }
+        let curve = &curves(&Results { about: Vec::new(), rows: lucky })[0];
+        assert!(curve.rare && curve.prediction.is_none());
     }
 
     #[test]

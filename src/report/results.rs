@@ -7,7 +7,7 @@ use std::path::Path;
 /// Stages of a render whose seconds are told apart, summed over threads.
 pub const STAGES: [&str; 5] = ["light trace", "vertex BVH", "eye trace", "roulette", "visibility"];
 
-/// One run of one setting up to one number of iterations.
+/// One run of one setting up to one rung of its ladder.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Row {
     /// The setting's name.
@@ -16,6 +16,8 @@ pub struct Row {
     pub biased: bool,
     /// Number of the run.
     pub run: usize,
+    /// Number of the rung; each takes about twice as long as the one before.
+    pub rung: u32,
     /// Iterations so far.
     pub iterations: u64,
     /// Wall-clock seconds so far, pre-passes included.
@@ -27,6 +29,8 @@ pub struct Row {
     /// The square of the error of [`Metrics::error`](super::metric::Metrics::error), the reference's own taken off; for
     /// small ones, chance may make it negative.
     pub square: f64,
+    /// The same with all pixels counted, the worst thousandth too.
+    pub whole: f64,
     /// Mean of LDR-FLIP against the reference, 0..=1: what a person would see of the error.
     pub flip: f64,
     /// Pixels brighter than ten times what they and their tile should be.
@@ -40,11 +44,11 @@ pub struct Row {
 pub struct Results {
     /// Names and values: scene, machine, versions, command line, ...
     pub about: Vec<(String, String)>,
-    /// The rows, by setting, run and iterations.
+    /// The rows, by setting, run and rung.
     pub rows: Vec<Row>,
 }
 
-const HEADER: &str = "setting,biased,run,iterations,seconds,setup_seconds,cpu_seconds,square_error,flip,fireflies,light_trace_s,vertex_bvh_s,eye_trace_s,roulette_s,visibility_s";
+const HEADER: &str = "setting,biased,run,rung,iterations,seconds,setup_seconds,cpu_seconds,square_error,whole_square_error,flip,fireflies,light_trace_s,vertex_bvh_s,eye_trace_s,roulette_s,visibility_s";
 
 impl Results {
     /// As text: `# name: value` lines, a header, a line for each row. Numbers come back to the last bit.
@@ -58,15 +62,17 @@ impl Results {
             let stages = r.stages.map(|s| s.to_string()).join(",");
             let _ = writeln!(
                 text,
-                "{},{},{},{},{},{},{},{},{},{},{stages}",
+                "{},{},{},{},{},{},{},{},{},{},{},{},{stages}",
                 r.setting,
                 u8::from(r.biased),
                 r.run,
+                r.rung,
                 r.iterations,
                 r.seconds,
                 r.setup,
                 r.cpu.map_or(String::new(), |s| s.to_string()),
                 r.square,
+                r.whole,
                 r.flip,
                 r.fireflies
             );
@@ -119,17 +125,19 @@ fn row(line: &str) -> Option<Row> {
     let number = |i: usize| words.get(i)?.parse::<f64>().ok().filter(|x| x.is_finite());
     let count = |i: usize| words.get(i)?.parse::<u64>().ok();
     Some(Row {
-        setting: (words.len() == 15).then(|| words[0].to_owned())?,
+        setting: (words.len() == 17).then(|| words[0].to_owned())?,
         biased: count(1)? != 0,
         run: count(2)? as usize,
-        iterations: count(3)?,
-        seconds: number(4)?,
-        setup: number(5)?,
-        cpu: if words.get(6)?.is_empty() { None } else { Some(number(6)?) },
-        square: number(7)?,
-        flip: number(8)?,
-        fireflies: count(9)?,
-        stages: [number(10)?, number(11)?, number(12)?, number(13)?, number(14)?],
+        rung: u32::try_from(count(3)?).ok()?,
+        iterations: count(4)?,
+        seconds: number(5)?,
+        setup: number(6)?,
+        cpu: if words.get(7)?.is_empty() { None } else { Some(number(7)?) },
+        square: number(8)?,
+        whole: number(9)?,
+        flip: number(10)?,
+        fireflies: count(11)?,
+        stages: [number(12)?, number(13)?, number(14)?, number(15)?, number(16)?],
     })
 }
 
@@ -143,11 +151,13 @@ mod tests {
             setting: "lvc+hrr".into(),
             biased: true,
             run: 3,
+            rung: 2,
             iterations: 8,
             seconds: 0.1 + 0.2,
             setup: 1e-9,
             cpu: Some(0.7),
             square: -1.5e-7,
+            whole: 2.5,
             flip: 0.125,
             fireflies: 2,
             stages: [0.1, 0.0, 3.25, 1e9, 0.3],

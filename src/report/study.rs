@@ -1,4 +1,4 @@
-//! A study: several settings of one scene, each run many times for a power-of-two ladder of iterations, in turn.
+//! A study: several settings of one scene, each run many times, in turn, up a ladder of times or of iterations.
 
 use super::results::Row;
 use super::{flip, metric};
@@ -8,11 +8,10 @@ use crate::image::Image;
 use crate::integrator;
 use crate::math::luminance;
 use crate::math::relative::{Tiles, floor, local_square, trimmed_mean};
-use crate::render::counters::processor_seconds;
-use crate::render::noise::TRIMMED;
+use crate::render::{self, counters::processor_seconds, noise::TRIMMED};
 use crate::sampler::counter::combine;
 use crate::scene::Scene;
-use crate::settings::Settings;
+use crate::settings::{Integrator, Settings};
 use crate::subpath::World;
 use glam::Vec3;
 use rayon::prelude::*;
@@ -20,6 +19,10 @@ use std::time::Instant;
 
 /// Most bytes of images that a study may keep.
 const MOST_BYTES: usize = 2 << 30;
+/// Independent renders that a reference is made of, and the share of a study's time that they take.
+const REFERENCE: (u64, f64) = (4, 0.5);
+/// Rungs of a ladder of renders by time.
+const RUNGS: u32 = 5;
 /// Iterations of the longest rung at most.
 const MOST_ITERATIONS: u64 = 1 << 12;
 /// A pixel this many times brighter than itself and its tile is a firefly.
@@ -52,7 +55,7 @@ pub struct Study {
     pub rows: Vec<Row>,
     /// What errors were measured against.
     pub reference: Reference,
-    /// The setting that it is made of; `None` when it was given.
+    /// The setting that it was made by; `None` when it was given.
     pub owner: Option<usize>,
     /// An image of each setting: the first run's longest.
     pub images: Vec<Image>,
@@ -76,8 +79,9 @@ struct Cost {
     stages: [f64; 5],
 }
 
-/// Runs it. Each run of each setting gets an equal share of `seconds`; the first runs show how many iterations that is.
-/// `runs` is at least 2. `exposure`: stops by which images are brighter when FLIP judges them. `tell` is told the finished
+/// Runs it. Each run of each setting gets an equal share of `seconds`, or of half of that where no reference is `given`. Where
+/// a setting leaves sizes of iterations open, rungs are renders by time, each as a user would have it; else all iterations
+/// are alike, and are looked at after 1, 2, 4, ... of them, as many as the first run has time for. `runs` is at least 2. `exposure`: stops by which images are brighter when FLIP judges them. `tell` is told the finished
 /// share; false from it ends the study with an error.
 ///
 /// # Errors
@@ -91,24 +95,33 @@ pub fn run(
     exposure: f32,
     tell: &dyn Fn(f64) -> bool,
 ) -> Result<Study> {
-    let share = seconds / (runs.max(2) * contenders.len().max(1)) as f64;
+    let (owner, reference, begun) = match given {
+        Some(reference) => (None, reference, 0.0),
+        None => {
+            let owner = trusted(scene, contenders)?;
+            let told = |done: f64| tell(REFERENCE.1 * done);
+            let reference = make_reference(scene, &contenders[owner].settings, REFERENCE.1 * seconds, &told)?;
+            (Some(owner), reference, REFERENCE.1)
+        }
+    };
+    let all = (runs.max(2) * contenders.len()) as f64;
+    let share = (1.0 - begun) * seconds / all;
     let mut ladders: Vec<Vec<Ladder>> = contenders.iter().map(|_| Vec::new()).collect();
     let mut longest = vec![None; contenders.len()];
-    let mut worlds: Vec<World<'_>> = Vec::new();
-    for contender in contenders {
-        worlds.push(World::new(scene, &contender.settings)?);
-    }
     for run in 0..runs.max(2) {
         for (i, contender) in contenders.iter().enumerate() {
-            if !tell((run * contenders.len() + i) as f64 / (runs.max(2) * contenders.len()) as f64) {
-                return Err(Error::Input("stopped: nothing was written".into()));
+            if !tell(begun + (1.0 - begun) * (run * contenders.len() + i) as f64 / all) {
+                return Err(stopped());
             }
             let settings = Settings {
-                // Numbers of its own: a reference made of another's runs shall not share their noise.
+                // Numbers of its own: settings shall not share their noise.
                 seed: combine(combine(contender.settings.seed, run as u64), i as u64) >> 1,
                 ..contender.settings.clone()
             };
-            let ladder = climb(&worlds[i], scene, &settings, share, longest[i])?;
+            let ladder = match settings.samples == 0 || settings.light_subpaths == 0 {
+                true => climb_by_time(scene, &settings, share)?,
+                false => climb(scene, &settings, share, longest[i])?,
+            };
             longest[i] = ladder.costs.last().map(|c| c.iterations);
             ladders[i].push(ladder);
         }
@@ -120,19 +133,53 @@ pub fn run(
             ));
         }
     }
-    Ok(measure(contenders, &ladders, given, exposure))
+    let rows = measure(contenders, &ladders, &reference, exposure);
+    Ok(Study {
+        rows,
+        reference,
+        owner,
+        images: ladders.iter().map(|runs| runs[0].images[runs[0].images.len() - 1].clone()).collect(),
+        longest: longest.into_iter().map(|n| n.unwrap_or(0)).collect(),
+    })
 }
 
-/// Runs one ladder: up to `longest` iterations, or until the time is up.
+/// Runs one ladder of renders by time, each twice as long as the one before.
+fn climb_by_time(scene: &Scene, settings: &Settings, seconds: f64) -> Result<Ladder> {
+    let first = seconds / f64::from((1u32 << RUNGS) - 1);
+    let mut ladder = Ladder { images: Vec::new(), costs: Vec::new() };
+    for rung in 0..RUNGS {
+        let time = Some(first * f64::from(1u32 << rung));
+        // Independent of the others.
+        let seed = combine(settings.seed, rung.into()) >> 1;
+        let (start, cpu_before) = (Instant::now(), processor_seconds());
+        let outcome = render::render(
+            scene,
+            &Settings { time, seed, error: None, ..settings.clone() },
+            &render::Silent,
+        )?;
+        let (seconds, s) = (start.elapsed().as_secs_f64(), outcome.stats.seconds);
+        ladder.images.push(outcome.film.image());
+        ladder.costs.push(Cost {
+            iterations: outcome.stats.iterations,
+            seconds,
+            setup: (seconds - s.render).max(0.0),
+            cpu: processor_seconds().zip(cpu_before).map(|(now, before)| now - before),
+            stages: [s.light_trace, s.vertex_bvh_build, s.eye_trace, s.roulette, s.visibility],
+        });
+    }
+    Ok(ladder)
+}
+
+/// Runs one ladder of iterations that are alike: up to `longest` iterations, or until the time is up.
 fn climb(
-    world: &World<'_>,
     scene: &Scene,
     settings: &Settings,
     seconds: f64,
     longest: Option<u64>,
 ) -> Result<Ladder> {
+    let world = World::new(scene, settings)?;
     let (start, cpu_before) = (Instant::now(), processor_seconds());
-    let mut machine = integrator::new(world, settings)?;
+    let mut machine = integrator::new(&world, settings)?;
     let setup = start.elapsed().as_secs_f64();
     let mut film = Film::new(&scene.film);
     let mut ladder = Ladder { images: Vec::new(), costs: Vec::new() };
@@ -168,25 +215,49 @@ fn climb(
     Ok(ladder)
 }
 
+fn stopped() -> Error {
+    Error::Input("stopped: nothing was written".into())
+}
+
+/// The setting to make a reference by: the first that is what `auto` would choose, or that does not blur at least. What
+/// merely has little noise may not have found all light.
+fn trusted(scene: &Scene, contenders: &[Contender]) -> Result<usize> {
+    let first = contenders.first().ok_or_else(|| Error::Input("a study of no settings".into()))?;
+    let auto = render::chosen(scene, &Settings { integrator: Integrator::Auto, ..first.settings.clone() })?;
+    let find = |accept: &dyn Fn(&Contender) -> bool| contenders.iter().position(|c| !c.biased && accept(c));
+    Ok(find(&|c| c.settings.integrator == auto).or_else(|| find(&|_| true)).unwrap_or(0))
+}
+
+/// Independent renders by time.
+fn make_reference(
+    scene: &Scene,
+    settings: &Settings,
+    seconds: f64,
+    tell: &dyn Fn(f64) -> bool,
+) -> Result<Reference> {
+    let mut images = Vec::new();
+    for i in 0..REFERENCE.0 {
+        if !tell(i as f64 / REFERENCE.0 as f64) {
+            return Err(stopped());
+        }
+        let timed = Settings {
+            time: Some(seconds / REFERENCE.0 as f64),
+            error: None,
+            seed: combine(settings.seed, !i) >> 1,
+            ..settings.clone()
+        };
+        images.push(render::render(scene, &timed, &render::Silent)?.film.image());
+    }
+    Ok(mean_and_variance(&images))
+}
+
 fn measure(
     contenders: &[Contender],
     ladders: &[Vec<Ladder>],
-    given: Option<Reference>,
+    reference: &Reference,
     exposure: f32,
-) -> Study {
-    let tops: Vec<Vec<&Image>> =
-        ladders.iter().map(|runs| runs.iter().filter_map(|l| l.images.last()).collect()).collect();
-    let means: Vec<Reference> = tops.iter().map(|images| mean_and_variance(images)).collect();
-    // The one that knows most; its own runs are measured with their share in it taken off.
-    let noise = |r: &Reference| Yardstick::new(r).noise();
-    let unbiased = (0..contenders.len()).filter(|&i| !contenders[i].biased);
-    let owner = if given.is_some() {
-        None
-    } else {
-        unbiased.min_by(|&a, &b| noise(&means[a]).total_cmp(&noise(&means[b]))).or(Some(0))
-    };
-    let reference = given.unwrap_or_else(|| means[owner.unwrap_or(0)].clone());
-    let yardstick = Yardstick::new(&reference);
+) -> Vec<Row> {
+    let yardstick = Yardstick::new(reference);
     let own_noise = yardstick.noise();
     let seen = reference.mean.exposed(exposure);
     let flip = |image: &Image| {
@@ -194,46 +265,35 @@ fn measure(
         map.iter().sum::<f64>() / map.len() as f64
     };
     let mut rows = Vec::new();
-    for (i, (contender, runs)) in contenders.iter().zip(ladders).enumerate() {
+    for (contender, runs) in contenders.iter().zip(ladders) {
         for (run, ladder) in runs.iter().enumerate() {
             let flips: Vec<f64> = ladder.images.par_iter().map(&flip).collect();
-            for ((image, cost), flip) in ladder.images.iter().zip(&ladder.costs).zip(flips) {
+            for (rung, ((image, cost), flip)) in (0..).zip(ladder.images.iter().zip(&ladder.costs).zip(flips))
+            {
                 let Cost { iterations, seconds, setup, cpu, stages } = *cost;
-                let measured = yardstick.square(image);
-                let longest = ladder.costs.last().map_or(1, |c| c.iterations);
-                let square = if owner == Some(i) {
-                    measured / (1.0 - iterations as f64 / (longest * runs.len() as u64) as f64)
-                } else {
-                    measured - own_noise
-                };
-                let fireflies = yardstick.fireflies(image);
-                let (setting, biased) = (contender.name.clone(), contender.biased);
+                let measured = yardstick.squares(image);
                 rows.push(Row {
-                    setting,
-                    biased,
+                    setting: contender.name.clone(),
+                    biased: contender.biased,
                     run,
+                    rung,
                     iterations,
                     seconds,
                     setup,
                     cpu,
-                    square,
+                    square: measured[0] - own_noise[0],
+                    whole: measured[1] - own_noise[1],
                     flip,
-                    fireflies,
+                    fireflies: yardstick.fireflies(image),
                     stages,
                 });
             }
         }
     }
-    Study {
-        rows,
-        owner,
-        images: tops.iter().map(|images| images[0].clone()).collect(),
-        longest: ladders.iter().map(|runs| runs[0].costs.last().map_or(0, |c| c.iterations)).collect(),
-        reference,
-    }
+    rows
 }
 
-/// Errors relative to a reference, as [`metric::Metrics::error`] has them.
+/// Errors relative to a reference, as [`metric::Metrics::error`] has them, and the same with all pixels counted.
 struct Yardstick<'a> {
     reference: &'a Reference,
     grid: Tiles,
@@ -255,22 +315,23 @@ impl<'a> Yardstick<'a> {
         self.tiles[self.grid.of(i as u32 % width, i as u32 / width)]
     }
 
-    fn trimmed(&self, square: impl Fn(usize) -> glam::DVec3) -> f64 {
+    fn means(&self, square: impl Fn(usize) -> glam::DVec3) -> [f64; 2] {
         let n = self.reference.mean.pixels.len();
         let mut values: Vec<f64> = (0..n).map(|i| local_square(square(i), self.tile(i), self.eps)).collect();
-        trimmed_mean(&mut values, TRIMMED)
+        let whole = values.iter().sum::<f64>() / n as f64;
+        [trimmed_mean(&mut values, TRIMMED), whole]
     }
 
-    fn square(&self, image: &Image) -> f64 {
-        self.trimmed(|i| {
+    fn squares(&self, image: &Image) -> [f64; 2] {
+        self.means(|i| {
             let d = image.pixels[i].as_dvec3() - self.reference.mean.pixels[i].as_dvec3();
             d * d
         })
     }
 
     /// The same of the reference itself.
-    fn noise(&self) -> f64 {
-        self.trimmed(|i| self.reference.variance.pixels[i].as_dvec3())
+    fn noise(&self) -> [f64; 2] {
+        self.means(|i| self.reference.variance.pixels[i].as_dvec3())
     }
 
     fn fireflies(&self, image: &Image) -> u64 {
@@ -283,7 +344,7 @@ impl<'a> Yardstick<'a> {
 }
 
 /// Of independent images.
-fn mean_and_variance(images: &[&Image]) -> Reference {
+fn mean_and_variance(images: &[Image]) -> Reference {
     let n = images.len() as f32;
     let pixel = |i: usize| {
         let mean = images.iter().map(|image| image.pixels[i]).sum::<Vec3>() / n;

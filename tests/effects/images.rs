@@ -185,6 +185,77 @@ fn machinery_without_an_effect_changes_no_bit() {
     assert!(differ(looked_up(plain()), opaque(0.9), Effect::Opacity, "opacity"));
 }
 
+/// The same for the machinery of what is far away: no path goes there.
+#[test]
+fn effects_that_no_path_meets_change_no_bit() {
+    let pt = Settings { integrator: Integrator::Pt, ..settings() };
+    let of = |name: &str, scattering: Scattering| Material::new(name, scattering);
+    let grey = || Material::diffuse("grey", Spectrum::splat(0.5));
+    let bumpy = || {
+        let tilted = [Vec3::new(0.7, 0.5, 0.9), Vec3::new(0.5, 0.5, 1.0)];
+        let image = Image { width: 2, height: 1, pixels: tilted.to_vec() };
+        let map = Texture::new(Arc::new(image), DVec2::ONE, DVec2::ZERO);
+        let mut material = grey();
+        material.set_maps(Maps { normal: Some(map), ..Maps::default() });
+        material
+    };
+    // So dim that it is not chosen among the lights, nor seen beside them.
+    let glowing = |emission: f64| {
+        let mut material = grey();
+        material.emission = Spectrum::splat(emission);
+        material.set_maps(Maps { emission: texture([0.5, 1.0]), ..Maps::default() });
+        material
+    };
+    let painted = Scattering::Diffuse { albedo: Spectrum::ONE, map: texture([0.2, 0.8]) };
+    let glass = || Scattering::Dielectric { ior: 1.5, alpha_x: 0.0, alpha_y: 0.0 };
+    let rough_glass = Scattering::Dielectric { ior: 1.5, alpha_x: 0.1, alpha_y: 0.1 };
+    for (effect, far, near) in [
+        (Effect::Specular, of("mirror", mirror()), of("mirror", mirror())),
+        (Effect::Refraction, of("glass", glass()), of("glass", glass())),
+        (Effect::Refraction, of("rough glass", rough_glass.clone()), of("rough glass", rough_glass)),
+        (Effect::Anisotropy, of("brushed", metal(1e-2, 0.1)), of("brushed", metal(1e-2, 0.1))),
+        (Effect::Textures, of("painted", painted.clone()), of("painted", painted)),
+        (Effect::NormalMaps, bumpy(), bumpy()),
+        (Effect::EmissionTextures, glowing(1e-300), glowing(1.0)),
+    ] {
+        let place = |scene: &mut Scene, at: Vec3, material: Material| {
+            let index = scene.materials.len() as u32;
+            let name = material.name.clone();
+            scene.materials.push(material);
+            cube(&mut scene.mesh, 0.3, at, index);
+            // A picture's worth of coordinates on every face.
+            let corners = scene.mesh.positions.len();
+            scene.mesh.uvs = (0..corners).map(|i| Vec2::new((i % 2) as f32, (i / 2 % 2) as f32)).collect();
+            assert_eq!(analyze(scene, &pt).of(effect).verdict, Verdict::Wanted, "{name}");
+        };
+        let (mut there, mut here) = (plain(), plain());
+        place(&mut there, Vec3::Z * 1e6, far);
+        place(&mut here, Vec3::new(-0.4, 0.3, 0.3), near);
+        let [bare, there, here] = [plain(), there, here].map(|scene| bits(&scene, &pt));
+        assert_eq!(there, bare, "{effect}");
+        assert_ne!(here, bare, "{effect}");
+    }
+    // A sky of next to no light, and the back of a lamp that nothing is behind.
+    let lit = |color: f64| {
+        let color = Spectrum::splat(color);
+        lit(plain(), LightSource::Environment { color, image: None })
+    };
+    let [dark, bare, bright] = [lit(1e-300), plain(), lit(1.0)].map(|scene| bits(&scene, &pt));
+    assert!(dark == bare && bright != bare);
+    let two_sided = |ceiling: bool| {
+        let mut scene = plain();
+        if ceiling {
+            quad(&mut scene.mesh, [[-1, 0, -1], [1, 0, -1], [1, 0, 1], [-1, 0, 1]], 2.0, Vec3::Y * 3.0, 1);
+        }
+        let one = bits(&scene, &pt);
+        scene.materials[0].two_sided_emission = true;
+        assert_eq!(analyze(&scene, &pt).of(Effect::TwoSidedEmission).verdict, Verdict::Wanted);
+        (one, bits(&scene, &pt))
+    };
+    let [(one, two), (under_one, under_two)] = [false, true].map(two_sided);
+    assert!(one == two && under_one != under_two);
+}
+
 /// Lobes that are as wide either way have one range, whatever its shape is called.
 #[test]
 fn isotropic_lobes_are_the_same_as_ellipsoids_and_as_spheroids() {

@@ -11,7 +11,6 @@ use clap::builder::ValueHint;
 use clap::{Arg, ArgAction, ArgMatches, value_parser};
 use hrr::effects::Verdict;
 use hrr::image::{self, Attributes};
-use hrr::integrator::Size;
 use hrr::render::{Observer, Progress};
 use hrr::report::chart;
 use hrr::report::curve::curves;
@@ -58,8 +57,9 @@ Examples:
       draws the page again
 
 Writes report.html (self-contained), report.md with its figures beside it, results.csv (every number) and the images. Each setting is run --runs times with
-different seeds, in turn with the others, and looked at after 1, 2, 4, ... iterations. Without --reference, errors are
-measured against the mean of all runs of the setting that knows most.";
+different seeds, in turn with the others: renders of five times, each twice as long as the one before, as --time would make
+them. With --samples and --light-subpaths, iterations of these sizes are looked at after 1, 2, 4, ... of them. Without
+--reference, half of the time goes into one, made by the integrator that finds all of the scene's light with least machinery.";
 
 impl CostArgs {
     pub fn new(m: &ArgMatches) -> Self {
@@ -144,12 +144,10 @@ pub fn run(args: &CostArgs, log: &Log) -> Result<u8> {
     }
     let Some(scene_args) = &args.scene else { return Err(Error::Usage("which scene?".into())) };
     scene_args.check()?;
-    let (mut scene, mut settings) = scene_args.load(|warning| log.warning(warning))?;
+    let (mut scene, settings) = scene_args.load(|warning| log.warning(warning))?;
     if args.quick {
-        shrink(&mut scene, &mut settings, scene_args);
+        shrink(&mut scene, scene_args);
     }
-    let size = Size::of(&settings, &scene.film);
-    (settings.samples, settings.light_subpaths) = (size.samples, size.light_subpaths);
     let contenders = contenders(&scene, &settings, args.quick, &args.sweeps)?;
     log.info(format_args!(
         "{}: {} settings, {} runs of each, {}x{} pixels, about {}",
@@ -226,21 +224,14 @@ pub fn observed<T: Send>(
     result
 }
 
-/// A small image and small iterations, where the user did not say otherwise.
-fn shrink(scene: &mut Scene, settings: &mut Settings, args: &SceneArgs) {
+/// A small image, where the user did not say otherwise.
+fn shrink(scene: &mut Scene, args: &SceneArgs) {
     let sized = args.overrides.iter().any(|(key, _)| key.starts_with("film."));
     let pixels = f64::from(scene.film.width) * f64::from(scene.film.height);
     let scale = (QUICK_PIXELS / pixels).sqrt().min(1.0);
     if !sized {
         let side = |n: u32| ((f64::from(n) * scale) as u32).max(1);
         (scene.film.width, scene.film.height) = (side(scene.film.width), side(scene.film.height));
-    }
-    let given = |name: &str| args.settings.iter().any(|(s, _)| s.name == name);
-    if !given("samples") {
-        settings.samples = 1;
-    }
-    if !given("light_subpaths") {
-        settings.light_subpaths = 4 * u64::from(scene.film.width) * u64::from(scene.film.height);
     }
 }
 
@@ -269,10 +260,7 @@ fn about(
             std::fs::read_to_string("/proc/loadavg")
                 .map_or("unknown".into(), |t| t.split(' ').take(3).collect::<Vec<_>>().join(" ")),
         ),
-        line(
-            "reference",
-            owner.map_or("given".into(), |i| format!("mean of all runs of {}", contenders[i].name)),
-        ),
+        line("reference", owner.map_or("given".into(), |i| format!("renders by {}", contenders[i].name))),
         line("effects", effects(scene, settings)),
         line("settings", settings.to_toml().trim().replace('\n', "; ")),
     ]

@@ -1,7 +1,7 @@
 //! What a study compares: integrators, and settings of one of them.
 
 use clap::{Arg, ArgAction};
-use hrr::integrator::Recipe;
+use hrr::integrator::{Recipe, Size};
 use hrr::report::study::Contender;
 use hrr::scene::Scene;
 use hrr::settings::{Integrator, Setting, Settings};
@@ -88,7 +88,7 @@ pub fn contenders(
     for integrator in main.into_iter().chain(more.into_iter().filter(|_| !quick)) {
         add(integrator.name().into(), Settings { integrator, ..base.clone() });
     }
-    let sweeps = if sweeps.is_empty() && !quick { usual(&base) } else { sweeps.to_vec() };
+    let sweeps = if sweeps.is_empty() && !quick { usual(&base, scene) } else { sweeps.to_vec() };
     for Sweep { name, values } in sweeps {
         for value in values {
             let mut changed = base.clone();
@@ -100,7 +100,7 @@ pub fn contenders(
 }
 
 /// What is worth comparing for an integrator.
-fn usual(base: &Settings) -> Vec<Sweep> {
+fn usual(base: &Settings, scene: &Scene) -> Vec<Sweep> {
     let recipe = Recipe::of(base.integrator);
     let mut sweeps: Vec<Sweep> = Vec::new();
     let mut add =
@@ -118,8 +118,9 @@ fn usual(base: &Settings) -> Vec<Sweep> {
     }
     add(RAYS);
     if recipe.is_some() {
-        let times = |factor: f64| ((base.light_subpaths as f64 * factor).max(1.0) as u64).to_string();
-        sweeps.push(Sweep { name: "light_subpaths", values: vec![times(0.1), times(10.0)] });
+        let pixels = Size::of(base, &scene.film).light_subpaths;
+        let values = [1, 10].map(|n| (n * pixels).to_string()).to_vec();
+        sweeps.push(Sweep { name: "light_subpaths", values });
     }
     sweeps
 }
