@@ -35,6 +35,17 @@ pub struct Prediction {
     pub measured_seconds: f64,
 }
 
+/// What a setting comes to with all pixels counted, those as well where it finds light rarely.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Whole {
+    /// Error at the longest rung.
+    pub error: Interval,
+    /// As [`Curve::unit`].
+    pub unit: Interval,
+    /// As [`Curve::speedup`].
+    pub speedup: Interval,
+}
+
 /// A setting's results.
 #[derive(Debug, Clone)]
 pub struct Curve {
@@ -50,8 +61,8 @@ pub struct Curve {
     pub unit: Interval,
     /// That of the first setting over it: how many times as fast this one is.
     pub speedup: Interval,
-    /// Error at the longest rung with all pixels counted, and how many times as fast to it this setting is as the first.
-    pub whole: (Interval, Interval),
+    /// The same with all pixels counted.
+    pub whole: Whole,
     /// From the rungs below the longest; `None` when there are too few, two for noise, four for blur, or when it is
     /// [`Curve::rare`].
     pub prediction: Option<Prediction>,
@@ -178,10 +189,11 @@ fn curve(name: &str, table: &Table<'_>, first: &Table<'_>) -> Curve {
         runs: n,
         unit: Interval::new(n, |runs| table.unit(runs, |r| r.square)),
         speedup: speedup(|r| r.square),
-        whole: (
-            Interval::new(n, |runs| table.mean(last, runs, |r| r.whole).max(0.0).sqrt()),
-            speedup(|r| r.whole),
-        ),
+        whole: Whole {
+            error: Interval::new(n, |runs| table.mean(last, runs, |r| r.whole).max(0.0).sqrt()),
+            unit: Interval::new(n, |runs| table.unit(runs, |r| r.whole)),
+            speedup: speedup(|r| r.whole),
+        },
         prediction: match (rare, biased) {
             (true, _) => None,
             (false, true) => predict_blur(table, &rungs),
@@ -293,7 +305,8 @@ mod tests {
         assert!(a.is_unresolved());
         // Twice the square with all pixels, of either.
         assert!(
-            (b.whole.0.value / b.rungs[4].error.value - 2f64.sqrt()).abs() < 1e-9 && b.whole.1 == b.speedup
+            (b.whole.error.value / b.rungs[4].error.value - 2f64.sqrt()).abs() < 1e-9
+                && b.whole.speedup == b.speedup
         );
         // Of equals, one in ten pairs is told apart by chance.
         let equal = |key: u64| {

@@ -171,12 +171,7 @@ fn climb_by_time(scene: &Scene, settings: &Settings, seconds: f64) -> Result<Lad
 }
 
 /// Runs one ladder of iterations that are alike: up to `longest` iterations, or until the time is up.
-fn climb(
-    scene: &Scene,
-    settings: &Settings,
-    seconds: f64,
-    longest: Option<u64>,
-) -> Result<Ladder> {
+fn climb(scene: &Scene, settings: &Settings, seconds: f64, longest: Option<u64>) -> Result<Ladder> {
     let world = World::new(scene, settings)?;
     let (start, cpu_before) = (Instant::now(), processor_seconds());
     let mut machine = integrator::new(&world, settings)?;
