@@ -148,7 +148,7 @@ fn predictions_come_true() {
             },
             biased: false,
         });
-        let study = study::run(scene, &contenders, 16, 4.0, None, 0.0, &|_| true).unwrap();
+        let study = study::run(scene, &contenders, 16, 8.0, None, 0.0, &|_| true).unwrap();
         for curve in curves(&Results { about: Vec::new(), rows: study.rows }) {
             let p = curve.prediction.unwrap();
             cases += 1;

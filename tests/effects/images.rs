@@ -185,7 +185,7 @@ fn machinery_without_an_effect_changes_no_bit() {
     assert!(differ(looked_up(plain()), opaque(0.9), Effect::Opacity, "opacity"));
 }
 
-/// The same for the machinery of what is far away: no path goes there.
+/// The same for the machinery of what is shut up in a block: no path goes there.
 #[test]
 fn effects_that_no_path_meets_change_no_bit() {
     let pt = Settings { integrator: Integrator::Pt, ..settings() };
@@ -209,7 +209,7 @@ fn effects_that_no_path_meets_change_no_bit() {
     let painted = Scattering::Diffuse { albedo: Spectrum::ONE, map: texture([0.2, 0.8]) };
     let glass = || Scattering::Dielectric { ior: 1.5, alpha_x: 0.0, alpha_y: 0.0 };
     let rough_glass = Scattering::Dielectric { ior: 1.5, alpha_x: 0.1, alpha_y: 0.1 };
-    for (effect, far, near) in [
+    for (effect, hidden, open) in [
         (Effect::Specular, of("mirror", mirror()), of("mirror", mirror())),
         (Effect::Refraction, of("glass", glass()), of("glass", glass())),
         (Effect::Refraction, of("rough glass", rough_glass.clone()), of("rough glass", rough_glass)),
@@ -218,22 +218,24 @@ fn effects_that_no_path_meets_change_no_bit() {
         (Effect::NormalMaps, bumpy(), bumpy()),
         (Effect::EmissionTextures, glowing(1e-300), glowing(1.0)),
     ] {
-        let place = |scene: &mut Scene, at: Vec3, material: Material| {
+        let place = |scene: &mut Scene, half: f32, at: Vec3, material: Material| {
             let index = scene.materials.len() as u32;
             let name = material.name.clone();
             scene.materials.push(material);
-            cube(&mut scene.mesh, 0.3, at, index);
-            // A picture's worth of coordinates on every face.
-            let corners = scene.mesh.positions.len();
-            scene.mesh.uvs = (0..corners).map(|i| Vec2::new((i % 2) as f32, (i / 2 % 2) as f32)).collect();
+            cube(&mut scene.mesh, half, at, index);
             assert_eq!(analyze(scene, &pt).of(effect).verdict, Verdict::Wanted, "{name}");
         };
-        let (mut there, mut here) = (plain(), plain());
-        place(&mut there, Vec3::Z * 1e6, far);
-        place(&mut here, Vec3::new(-0.4, 0.3, 0.3), near);
-        let [bare, there, here] = [plain(), there, here].map(|scene| bits(&scene, &pt));
-        assert_eq!(there, bare, "{effect}");
-        assert_ne!(here, bare, "{effect}");
+        let (mut inside, mut outside) = (plain(), plain());
+        // All of a picture on every face; tangents follow it.
+        let unrolled = |mut scene: Scene| {
+            let corners = scene.mesh.positions.len();
+            scene.mesh.uvs = (0..corners).map(|i| Vec2::new((i % 2) as f32, (i / 2 % 2) as f32)).collect();
+            scene
+        };
+        place(&mut inside, 0.1, Vec3::new(0.2, 0.3, 0.0), hidden);
+        place(&mut outside, 0.3, Vec3::new(-0.4, 0.3, 0.3), open);
+        let [bare, inside, outside] = [plain(), inside, outside].map(|scene| bits(&unrolled(scene), &pt));
+        assert!(inside == bare && outside != bare, "{effect}");
     }
     // A sky of next to no light, and the back of a lamp that nothing is behind.
     let lit = |color: f64| {
