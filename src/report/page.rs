@@ -100,14 +100,15 @@ pub fn figures(curves: &[Curve]) -> Vec<Figure> {
         Figure {
             name: "curves",
             title: "Error against time",
-            text: "Lower is better. With iterations of one size noise halves in four times the time: a slope of -1/2. A cross is what the shorter runs \
-                   predicted for the longest.",
+            text: "Lower is better. With iterations of one size noise halves in four times the time: a slope of -1/2. A \
+                   cross is what the shorter runs predicted for the longest.",
             svg: chart::log_log("curves", &lines, ["seconds", "error"], true),
         },
         Figure {
             name: "pareto",
             title: "Usual error against that of all pixels",
-            text: "Lower left is better, after the longest runs. Far up are settings that find some light rarely, and then brightly.",
+            text: "Lower left is better, after the longest runs. Far up are settings that find some light rarely, and \
+                   then brightly.",
             svg: chart::log_log("pareto", &points, ["error", "error, all pixels"], false),
         },
         Figure {

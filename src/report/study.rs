@@ -79,10 +79,11 @@ struct Cost {
     stages: [f64; 5],
 }
 
-/// Runs it. Each run of each setting gets an equal share of `seconds`, or of half of that where no reference is `given`. Where
-/// a setting leaves sizes of iterations open, rungs are renders by time, each as a user would have it; else all iterations
-/// are alike, and are looked at after 1, 2, 4, ... of them, as many as the first run has time for. `runs` is at least 2. `exposure`: stops by which images are brighter when FLIP judges them. `tell` is told the finished
-/// share; false from it ends the study with an error.
+/// Runs it. Each run of each setting gets an equal share of `seconds`, or of half of that where no reference is `given`.
+/// Where a setting leaves sizes of iterations open, rungs are renders by time, each as a user would have it; else all
+/// iterations are alike, and are looked at after 1, 2, 4, ... of them, as many as the first run has time for. `runs` is at
+/// least 2. `exposure`: stops by which images are brighter when FLIP judges them. `tell` is told the finished share; false
+/// from it ends the study with an error.
 ///
 /// # Errors
 /// What rendering reports; [`Error::Memory`] when the images would not fit.
@@ -143,20 +144,20 @@ pub fn run(
     })
 }
 
+/// A render of so many seconds, independent of those with other numbers.
+fn by_time(scene: &Scene, settings: &Settings, seconds: f64, number: u64) -> Result<render::Outcome> {
+    let seed = combine(settings.seed, number) >> 1;
+    let timed = Settings { time: Some(seconds), error: None, seed, ..settings.clone() };
+    render::render(scene, &timed, &render::Silent)
+}
+
 /// Runs one ladder of renders by time, each twice as long as the one before.
 fn climb_by_time(scene: &Scene, settings: &Settings, seconds: f64) -> Result<Ladder> {
     let first = seconds / f64::from((1u32 << RUNGS) - 1);
     let mut ladder = Ladder { images: Vec::new(), costs: Vec::new() };
     for rung in 0..RUNGS {
-        let time = Some(first * f64::from(1u32 << rung));
-        // Independent of the others.
-        let seed = combine(settings.seed, rung.into()) >> 1;
         let (start, cpu_before) = (Instant::now(), processor_seconds());
-        let outcome = render::render(
-            scene,
-            &Settings { time, seed, error: None, ..settings.clone() },
-            &render::Silent,
-        )?;
+        let outcome = by_time(scene, settings, first * f64::from(1u32 << rung), rung.into())?;
         let (seconds, s) = (start.elapsed().as_secs_f64(), outcome.stats.seconds);
         ladder.images.push(outcome.film.image());
         ladder.costs.push(Cost {
@@ -235,13 +236,7 @@ fn make_reference(
         if !tell(i as f64 / REFERENCE.0 as f64) {
             return Err(stopped());
         }
-        let timed = Settings {
-            time: Some(seconds / REFERENCE.0 as f64),
-            error: None,
-            seed: combine(settings.seed, !i) >> 1,
-            ..settings.clone()
-        };
-        images.push(render::render(scene, &timed, &render::Silent)?.film.image());
+        images.push(by_time(scene, settings, seconds / REFERENCE.0 as f64, !i)?.film.image());
     }
     Ok(mean_and_variance(&images))
 }

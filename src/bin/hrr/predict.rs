@@ -50,7 +50,7 @@ pub fn command() -> clap::Command {
         .arg_required_else_help(true)
         .arg(scene_args::scene())
         .arg(runs_arg())
-        .arg(seconds_arg("Seconds for the short renders [default: 30]"))
+        .arg(seconds_arg("Seconds for the short renders and for what they are compared with [default: 30]"))
         .arg(scene_args::size("Output"))
         .args(scene_args::changes(|s| !["time", "iterations", "first_iteration"].contains(&s.name)))
         .args(message_args())
