@@ -6,7 +6,7 @@ use crate::tally::Tally;
 /// Pixels around one that say what it needs: few samples of one alone say little.
 const AROUND: usize = 2;
 /// Samples of a pixel without which nothing is said.
-const ENOUGH: f64 = 4.0;
+const ENOUGH: f64 = 3.0;
 /// What a connection of a kept light vertex costs, over a visit of a node.
 const CONNECTION: f64 = 12.0;
 
