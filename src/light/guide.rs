@@ -15,7 +15,7 @@ use std::collections::BTreeMap;
 const SIDE: usize = 32;
 const CELLS: usize = SIDE * SIDE;
 /// Share of directions that follow the histogram.
-const GUIDED: f64 = 0.25;
+const GUIDED: f64 = 0.35;
 /// Kinds of emitters beyond which there is too little to learn for each.
 const MOST_KINDS: usize = 1024;
 
