@@ -5,6 +5,7 @@
 # nothing when all is there. See docs/setup.md.
 #
 #   scripts/setup.sh             the above
+#   scripts/setup.sh --browser   Chromium as well, for the test of reports, where packages may be installed
 #   scripts/setup.sh --private   install no packages even when root
 #   scripts/setup.sh --force     look again even when an earlier run found everything
 set -euo pipefail
@@ -24,12 +25,13 @@ header_sha256="libembree-dev 674a8b3d1a00612f46730da29f4cc146267b4917bbf0242113d
 libimath-dev 586350a1b47f754a63132f5aadd426d8d2cc49f00fa873a268fa84041bca0616
 libfmt-dev c084df80e2842bc57157e8def529f4ca6bc8743d005550b56a5ef96c9bc92f0f"
 
-private='' force=''
+private='' force='' browser=''
 for argument in "$@"; do
     case $argument in
     --private) private=1 ;;
     --force) force=1 ;;
-    *) echo "setup: unknown argument $argument (known: --private, --force)" >&2 && exit 2 ;;
+    --browser) browser=1 ;;
+    *) echo "setup: unknown argument $argument (known: --browser, --private, --force)" >&2 && exit 2 ;;
     esac
 done
 
@@ -62,7 +64,9 @@ up_to_date() (
         while read -r line; do [ -e "$line" ] || return 1; done
     } <stamp
 )
-[ -z "$force" ] && up_to_date && exit 0
+browser_there() { command -v chromium chromium-browser google-chrome; }
+[ -z "$browser" ] || ! browser_there >/dev/null || browser=''
+[ -z "$force$browser" ] && up_to_date && exit 0
 
 scratch=$(mktemp -d)
 trap 'rm -rf "$scratch"' EXIT
@@ -280,27 +284,42 @@ make_prefix() {
 
 # ---- The way through.
 
-look
-if [ ${#missing[@]} -gt 0 ] && command -v apt-get >/dev/null; then
-    if may_install; then
-        # A fresh container has no package lists yet.
-        offers libc6 0 || as_root apt-get update -qq >"$scratch/log" 2>&1 || true
-        read -r -a packages < <(wanted_packages | tr '\n' ' ') || true
-        if [ ${#packages[@]} -gt 0 ]; then
-            install_packages "${packages[@]}" || say "apt-get could not"
-            look
+# A fresh container has no package lists yet.
+update_lists() { offers libc6 0 || as_root apt-get update -qq >"$scratch/log" 2>&1 || true; }
+bring_libraries() {
+    local packages=()
+    look
+    if [ ${#missing[@]} -gt 0 ] && command -v apt-get >/dev/null; then
+        if may_install; then
+            update_lists
+            read -r -a packages < <(wanted_packages | tr '\n' ' ') || true
+            if [ ${#packages[@]} -gt 0 ]; then
+                install_packages "${packages[@]}" || say "apt-get could not"
+                look
+            fi
+        elif [ -z "$private" ]; then
+            read -r -a packages < <(wanted_packages | tr '\n' ' ') || true
+            [ ${#packages[@]} = 0 ] || say "(with root's rights, these packages would be used: ${packages[*]})"
         fi
-    elif [ -z "$private" ]; then
-        packages=$(wanted_packages | tr '\n' ' ')
-        [ -z "$packages" ] || say "(with root's rights, these packages would be used: $packages)"
     fi
-fi
-mkdir -p "$prefix"
-if [ ${#missing[@]} -gt 0 ]; then make_prefix; fi
-rm -rf "$prefix/include" "$prefix/lib" "$prefix/cargo.toml" "$stamp"
-if [ ${#missing[@]} -gt 0 ]; then
-    mv "$new"/* "$prefix/" && rmdir "$new"
-    found+=(lib include cargo.toml)
-fi
-{ identity && printf '%s\n' "${found[@]}"; } >"$stamp"
+    mkdir -p "$prefix"
+    if [ ${#missing[@]} -gt 0 ]; then make_prefix; fi
+    rm -rf "$prefix/include" "$prefix/lib" "$prefix/cargo.toml" "$stamp"
+    if [ ${#missing[@]} -gt 0 ]; then
+        mv "$new"/* "$prefix/" && rmdir "$new"
+        found+=(lib include cargo.toml)
+    fi
+    { identity && printf '%s\n' "${found[@]}"; } >"$stamp"
+}
+# Not needed to build: what cannot be brought is said, and no more.
+bring_browser() {
+    if may_install; then
+        update_lists
+        if offers chromium 0 && install_packages chromium; then return; fi
+    fi
+    say "could not bring Chromium (package chromium)"
+}
+
+if [ -n "$force" ] || ! up_to_date; then bring_libraries; fi
+if [ -n "$browser" ]; then bring_browser; fi
 say "done"

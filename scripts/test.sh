@@ -10,7 +10,7 @@ cd "$(dirname "${BASH_SOURCE[0]}")/.."
 # Sets of features: the default ones, and none.
 builds=("" "--no-default-features")
 case "${*-}" in
-"") scripts/setup.sh ;;
+"") scripts/setup.sh --browser ;;
 --pure) builds=("--no-default-features") ;;
 *) echo "test: unknown arguments: $* (known: --pure)" >&2 && exit 2 ;;
 esac
@@ -33,4 +33,10 @@ for build in "${builds[@]}"; do
     # shellcheck disable=SC2086
     run cargo test $locked $build
 done
+if command -v chromium chromium-browser google-chrome >/dev/null; then
+    # shellcheck disable=SC2086
+    run cargo test $locked ${builds[-1]} --test main reports_work_in_a_browser -- --ignored
+else
+    echo "test: no Chromium here: how reports work in a browser was not tested" >&2
+fi
 echo "test: all is well" >&2

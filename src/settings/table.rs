@@ -269,8 +269,8 @@ pub const TABLE: &[Setting] = &[
         value_name: "NAME",
         heading: TRANSPORT,
         help: "Whether emitters send light (+hrr) where a pre-pass found it useful",
-        doc: "on: towards what reaches the image by way of surfaces where the roulette plays; three directions \
-              of ten stay as they are without. off: by the cosine alone. auto: on, but off beside vertex merging, \
+        doc: "on: towards what reaches the image by way of surfaces where the roulette plays; two directions \
+              of three stay as they are without. off: by the cosine alone. auto: on, but off beside vertex merging, \
               which wants light everywhere.",
     },
     Setting {
