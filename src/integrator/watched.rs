@@ -1,12 +1,13 @@
 //! What iterations so far showed of every pixel: its noise by where that comes from, and what the roulette costs there.
 
+use super::parts::LEAST_SAMPLES;
 use crate::math::{Spectrum, luminance};
 use crate::tally::Tally;
 
 /// Pixels around one that say what it needs: few samples of one alone say little.
 const AROUND: usize = 2;
-/// Samples of a pixel without which nothing is said.
-const ENOUGH: f64 = 3.0;
+/// Samples of a pixel without which nothing is said: that of the preview, and those of a pilot that ran out of time.
+const ENOUGH: f64 = 1.0 + LEAST_SAMPLES as f64;
 /// What a connection of a kept light vertex costs, over a visit of a node.
 const CONNECTION: f64 = 12.0;
 

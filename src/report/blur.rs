@@ -6,6 +6,9 @@
 /// The exponents that are tried; 0: a blur that stays.
 const EXPONENTS: usize = 20;
 
+/// From here on an exponent is as good as that of noise.
+const AS_NOISE: f64 = 0.9;
+
 /// How a square error is made up.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Blur {
@@ -48,6 +51,11 @@ impl Blur {
 
     fn residual(&self, points: &[(f64, f64)]) -> f64 {
         points.iter().map(|&(n, square)| (self.square(n) / square - 1.0).powi(2)).sum()
+    }
+
+    /// Whether what was taken for blur may as well be noise, since it falls as fast.
+    pub fn is_like_noise(&self) -> bool {
+        self.exponent >= AS_NOISE
     }
 
     /// The square error after `n` iterations.
@@ -103,7 +111,8 @@ mod tests {
         // Falls faster than noise.
         let steep: Vec<_> = (0..6).map(|k| f64::from(1 << k)).map(|n| (n, n.powf(-1.2))).collect();
         let found = Blur::fit(&steep).unwrap();
-        assert!(found.noise >= 0.0 && found.blur >= 0.0, "{found:?}");
+        assert!(found.noise >= 0.0 && found.blur >= 0.0 && found.is_like_noise(), "{found:?}");
+        assert!(!Blur::fit(&points(0.1, 0.1, 0.8)).unwrap().is_like_noise());
         assert_eq!(Blur::fit(&points(1.0, 1.0, 0.5)[..3]), None);
         assert_eq!(Blur::fit(&[(1.0, 1.0), (2.0, -0.1), (4.0, 0.1), (8.0, 0.1)]), None);
     }

@@ -92,7 +92,14 @@ pub struct Figure {
 
 /// The charts of a study.
 pub fn figures(curves: &[Curve]) -> Vec<Figure> {
-    let lines: Vec<Line> = curves.iter().map(line).collect();
+    // More lines than colours are a thicket: what is not told apart from the first says nothing there.
+    let drawn = |c: &&Curve| {
+        curves.len() <= chart::COLOURS.len()
+            || c.name == curves[0].name
+            || told_apart(c.speedup)
+            || told_apart(c.whole.speedup)
+    };
+    let lines: Vec<Line> = curves.iter().filter(drawn).map(line).collect();
     let points: Vec<Line> = curves.iter().map(point).collect();
     let stages: Vec<(String, Vec<f64>)> =
         curves.iter().map(|c| (escape(&c.name), c.stages.to_vec())).collect();
@@ -101,7 +108,8 @@ pub fn figures(curves: &[Curve]) -> Vec<Figure> {
             name: "curves",
             title: "Error against time",
             text: "Lower is better. With iterations of one size noise halves in four times the time: a slope of -1/2. A \
-                   cross is what the shorter runs predicted for the longest.",
+                   cross is what the shorter runs predicted for the longest. Of more than ten settings those are drawn that are \
+                   told apart from the first.",
             svg: chart::log_log("curves", &lines, ["seconds", "error"], true),
         },
         Figure {
@@ -215,6 +223,9 @@ pub fn sentences(curves: &[Curve]) -> Vec<String> {
             if blur.blur == 0.0 {
                 return format!("Of {}'s error no blur is seen beside the noise.", c.name);
             }
+            if blur.is_like_noise() {
+                return format!("Of {}'s error blur is not told from noise: all of it falls as noise does.", c.name);
+            }
             format!(
                 "{}: noise of {} and blur of {} in the first iteration; the blur's square falls as n^-{:.2}, and outweighs \
                  the noise from {} iterations on.",
@@ -238,9 +249,14 @@ fn fastest(curves: &[Curve], times: impl Fn(&Curve) -> (Interval, Interval)) -> 
     curves.first().filter(resolved).filter(|_| times(best).1.holds(1.0)).or(Some(best))
 }
 
+/// Whether a speed over that of the first setting says which of the two is faster.
+fn told_apart(speed: Interval) -> bool {
+    speed.value.is_finite() && !speed.holds(1.0)
+}
+
 /// Speeds with all pixels counted; `None` where no others are told apart from the first.
 fn with_all_pixels(first: &Curve, others: &[Curve]) -> Option<String> {
-    let resolved = |c: &&Curve| c.whole.speedup.value.is_finite() && !c.whole.speedup.holds(1.0);
+    let resolved = |c: &&Curve| told_apart(c.whole.speedup);
     let speed = |c: &Curve| {
         let s = c.whole.speedup;
         format!("{} {} ({} to {})", c.name, number(s.value), number(s.low), number(s.high))
@@ -282,7 +298,7 @@ pub(super) fn cells(curves: &[Curve]) -> Vec<[String; COLUMNS.len()]> {
         let (e, u, s, whole) = (last.error, c.unit, c.speedup, c.whole.error);
         let speed = |s: Interval| match c.name == curves[0].name {
             true => "1".to_owned(),
-            false if s.holds(1.0) || !s.value.is_finite() => "not resolved".to_owned(),
+            false if !told_apart(s) => "not resolved".to_owned(),
             false => format!("x {}", spread(s.value, s.low, s.high, &number)),
         };
         lines.push([
