@@ -3,6 +3,8 @@
 //! Noise falls as 1/n; blur falls with the shrinking radius, c = 2 (1 - alpha) in the limit [Knaus & Zwicker 2011], where
 //! the fit finds c itself from what was measured.
 
+use super::fall::TwoParts;
+
 /// The exponents that are tried; 0: a blur that stays.
 const EXPONENTS: usize = 20;
 
@@ -27,30 +29,13 @@ impl Blur {
         if points.len() < 4 || points.iter().any(|&(n, square)| !(n > 0.0 && square > 0.0)) {
             return None;
         }
-        let candidates = (0..EXPONENTS).map(|i| Self::with(points, i as f64 / EXPONENTS as f64));
-        candidates.min_by(|a, b| a.residual(points).total_cmp(&b.residual(points)))
+        let candidates = (0..EXPONENTS).map(|i| TwoParts::fit(points, i as f64 / EXPONENTS as f64));
+        let best = candidates.min_by(|a, b| a.residual(points).total_cmp(&b.residual(points)))?;
+        Some(Self { noise: best.first, blur: best.second, exponent: best.exponent })
     }
 
-    /// The fit for a given exponent.
-    fn with(points: &[(f64, f64)], exponent: f64) -> Self {
-        // Columns n^-1 / square and n^-c / square, right-hand side 1.
-        let (mut xx, mut xy, mut yy, mut x1, mut y1) = (0.0, 0.0, 0.0, 0.0, 0.0);
-        for &(n, square) in points {
-            let (x, y) = (1.0 / (n * square), n.powf(-exponent) / square);
-            (xx, xy, yy, x1, y1) = (xx + x * x, xy + x * y, yy + y * y, x1 + x, y1 + y);
-        }
-        let det = xx * yy - xy * xy;
-        let (noise, blur) = ((x1 * yy - y1 * xy) / det, (y1 * xx - x1 * xy) / det);
-        let alone = [(x1 / xx, 0.0), (0.0, y1 / yy)].map(|(noise, blur)| Self { noise, blur, exponent });
-        if noise >= 0.0 && blur >= 0.0 {
-            return Self { noise, blur, exponent };
-        }
-        let [a, b] = alone;
-        if a.residual(points) <= b.residual(points) { a } else { b }
-    }
-
-    fn residual(&self, points: &[(f64, f64)]) -> f64 {
-        points.iter().map(|&(n, square)| (self.square(n) / square - 1.0).powi(2)).sum()
+    fn parts(&self) -> TwoParts {
+        TwoParts { first: self.noise, second: self.blur, exponent: self.exponent }
     }
 
     /// Whether what was taken for blur may as well be noise, since it falls as fast.
@@ -60,7 +45,7 @@ impl Blur {
 
     /// The square error after `n` iterations.
     pub fn square(&self, n: f64) -> f64 {
-        self.noise / n + self.blur * n.powf(-self.exponent)
+        self.parts().square(n)
     }
 
     /// Iterations from which on there is more blur than noise; infinite when there never is.
@@ -74,15 +59,7 @@ impl Blur {
 
     /// Iterations to a square error; infinite when it is never reached.
     pub fn iterations_to(&self, square: f64) -> f64 {
-        let (mut low, mut high) = (1e-6f64.ln(), 1e18f64.ln());
-        if !(self.square(high.exp()) <= square) {
-            return f64::INFINITY;
-        }
-        while high - low > 1e-9 {
-            let middle = 0.5 * (low + high);
-            if self.square(middle.exp()) > square { low = middle } else { high = middle }
-        }
-        high.exp()
+        self.parts().reached(square)
     }
 }
 

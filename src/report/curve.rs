@@ -2,6 +2,7 @@
 
 use super::blur::Blur;
 use super::bootstrap::Interval;
+use super::fall::Fall;
 use super::results::{Results, Row};
 use crate::math::relative::median;
 use std::collections::BTreeMap;
@@ -137,24 +138,11 @@ impl<'a> Table<'a> {
             .collect()
     }
 
-    /// The line through the rungs below the longest, at most [`FITTED`]: intercept and slope of the logarithm of the
-    /// square error over that of the seconds. The slope of noise is -1 but for what is trimmed off, which is more where
-    /// short runs leave rarer peaks, and but for iterations that grow with the time there is.
-    fn fit(&self, runs: &[usize]) -> (f64, f64) {
+    /// Of the rungs below the longest, at most [`FITTED`].
+    fn fit(&self, runs: &[usize]) -> Fall {
         let below = self.rungs.len() - 1;
-        let rungs = below.saturating_sub(FITTED)..below;
-        let n = rungs.len() as f64;
-        let points: Vec<[f64; 2]> = rungs
-            .map(|k| {
-                let square = self.mean(k, runs, |r| r.square).max(f64::MIN_POSITIVE);
-                [self.own_seconds(k).ln(), square.ln()]
-            })
-            .collect();
-        let mean = |i: usize| points.iter().map(|p| p[i]).sum::<f64>() / n;
-        let (x, y) = (mean(0), mean(1));
-        let slope = points.iter().map(|p| (p[0] - x) * (p[1] - y)).sum::<f64>()
-            / points.iter().map(|p| (p[0] - x).powi(2)).sum::<f64>();
-        (y - slope * x, slope)
+        let point = |k: usize| (self.own_seconds(k), self.mean(k, runs, |r| r.square).max(f64::MIN_POSITIVE));
+        Fall::fit(&(below.saturating_sub(FITTED)..below).map(point).collect::<Vec<_>>())
     }
 }
 
@@ -212,16 +200,8 @@ fn curve(name: &str, table: &Table<'_>, first: &Table<'_>) -> Curve {
 fn predict(table: &Table<'_>, rungs: &[Rung]) -> Prediction {
     let all: Vec<usize> = (0..table.runs).collect();
     let (longest, setup) = (table.own_seconds(rungs.len() - 1), table.median(0, |r| r.setup));
-    let (intercept, slope) = table.fit(&all);
-    extrapolate(
-        table,
-        rungs,
-        |runs| {
-            let (intercept, slope) = table.fit(runs);
-            (intercept + slope * longest.ln()).exp()
-        },
-        |square| setup + ((square.ln() - intercept) / slope).exp(),
-    )
+    let fall = table.fit(&all);
+    extrapolate(table, rungs, |runs| table.fit(runs).square(longest), |square| setup + fall.reached(square))
 }
 
 fn predict_blur(table: &Table<'_>, rungs: &[Rung]) -> Option<Prediction> {

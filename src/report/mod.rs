@@ -7,6 +7,7 @@ pub mod bootstrap;
 pub mod backends;
 pub mod study;
 pub mod results;
+pub mod fall;
 pub mod blur;
 pub mod curve;
 pub mod chart;

@@ -34,6 +34,9 @@ const PCBPT_SPHEROID: Recipe = Recipe {
 const PT: Recipe = Recipe { name: "pt", set: |s| Settings { integrator: Integrator::Pt, ..s } };
 const LVC: Recipe = Recipe { name: "lvc", set: |s| Settings { integrator: Integrator::Lvc, ..s } };
 const LVC_HRR: Recipe = Recipe { name: "lvc+hrr", set: |s| Settings { integrator: Integrator::LvcHrr, ..s } };
+/// What the others are judged by: as many light subpaths as there is time for, whatever the scene sets.
+const REFEREE: Recipe =
+    Recipe { name: "lvc+hrr", set: |s| Settings { integrator: Integrator::LvcHrr, light_subpaths: 0, ..s } };
 const PCVCM: Recipe = Recipe { name: "pcvcm", set: |s| Settings { integrator: Integrator::Pcvcm, ..s } };
 const PCVCM_HRR: Recipe =
     Recipe { name: "pcvcm+hrr", set: |s| Settings { integrator: Integrator::PcvcmHrr, ..s } };
@@ -116,7 +119,7 @@ fn variant(scene: Scene, material: &str) -> Variant {
 }
 
 fn judged(scene: Scene, material: &str) -> Variant {
-    Variant { referee: Some(LVC_HRR), ..variant(scene, material) }
+    Variant { referee: Some(REFEREE), ..variant(scene, material) }
 }
 
 /// The pixels in whose middle a material is seen.
