@@ -232,7 +232,7 @@ fn emitter_vertices_keep_the_mean() {
                 seed: 10 * i as u64 + seed,
                 visibility: Backend::BEST,
                 expected: 2.0,
-                iterations: 64,
+                iterations: 128,
                 samples: 8,
                 ..scenes::settings()
             };
@@ -259,8 +259,9 @@ fn the_numerics_of_the_roulette_agree() {
     let run = |seed: u64, changes: &[(&str, &str)]| {
         let mut settings = Settings {
             integrator: Integrator::LvcHrr,
-            seed,
+            seed: seed,
             visibility: Backend::BEST,
+            iterations: 128,
             samples: 8,
             max_depth: 8,
             ..scenes::settings()

@@ -88,8 +88,10 @@ mod tests {
         // Falls faster than noise.
         let steep: Vec<_> = (0..6).map(|k| f64::from(1 << k)).map(|n| (n, n.powf(-1.2))).collect();
         let found = Blur::fit(&steep).unwrap();
-        assert!(found.noise >= 0.0 && found.blur >= 0.0 && found.is_like_noise(), "{found:?}");
-        assert!(!Blur::fit(&points(0.1, 0.1, 0.8)).unwrap().is_like_noise());
+        assert!(found.noise >= 0.0 && found.blur >= 0.0, "{found:?}");
+        for (exponent, like_noise) in [(0.8, false), (0.95, true)] {
+            assert_eq!(Blur::fit(&points(0.0, 0.1, exponent)).unwrap().is_like_noise(), like_noise);
+        }
         assert_eq!(Blur::fit(&points(1.0, 1.0, 0.5)[..3]), None);
         assert_eq!(Blur::fit(&[(1.0, 1.0), (2.0, -0.1), (4.0, 0.1), (8.0, 0.1)]), None);
     }
