@@ -259,7 +259,7 @@ fn the_numerics_of_the_roulette_agree() {
     let run = |seed: u64, changes: &[(&str, &str)]| {
         let mut settings = Settings {
             integrator: Integrator::LvcHrr,
-            seed: seed,
+            seed,
             visibility: Backend::BEST,
             iterations: 128,
             samples: 8,

@@ -147,7 +147,7 @@ fn guided_directions_carry_the_same_power() {
             inverse.push(emitter.pdf_w(w) / guide.pdf(&light, w, DVec3::ZERO));
             sides.push(emitter.pdf_w(w) / guide.pdf(&light, w, DVec3::ZERO) * w.dot(useful));
         }
-        // A third is guided, and so near; of all directions 4 % at most are.
+        // A third is guided, and so near; unguided, 2 % at most would be.
         assert!(near.mean() > 0.3, "{}", near.mean());
         assert!(inverse.z_test(1.0, 0.0) > 1e-5, "{}", inverse.mean());
         // The cosine lobe's mean direction is 2/3 along the normal; both sides cancel.
