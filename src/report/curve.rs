@@ -142,7 +142,11 @@ impl<'a> Table<'a> {
     fn fit(&self, runs: &[usize]) -> Fall {
         let below = self.rungs.len() - 1;
         let point = |k: usize| (self.own_seconds(k), self.mean(k, runs, |r| r.square).max(f64::MIN_POSITIVE));
-        Fall::fit(&(below.saturating_sub(FITTED)..below).map(point).collect::<Vec<_>>())
+        let first = below.saturating_sub(FITTED);
+        let ratio = |value: &dyn Fn(usize) -> f64| value(below - 1) / value(first);
+        let more = ratio(&|k| self.median(k, |r| r.iterations as f64));
+        let growing = more < ratio(&|k| self.own_seconds(k)).sqrt();
+        Fall::fit(&(first..below).map(point).collect::<Vec<_>>(), growing)
     }
 }
 
