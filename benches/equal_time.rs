@@ -3,7 +3,7 @@
 //!
 //! `cargo bench --bench equal_time -- STUDY DIRECTORY [seconds] [runs] [size] [threads] [scenes]`
 //!
-//! STUDY: `mirror`, `brushed`, `merging`, `graceful`, `graceful_pc`, `convergence` (see [`study::of`]). Writes DIRECTORY/STUDY.csv, a picture of each
+//! STUDY: `mirror`, `brushed`, `merging`, `graceful`, `graceful_pc`, `convergence`, `additions` (see [`study::of`]). Writes DIRECTORY/STUDY.csv, a picture of each
 //! recipe's first run and one of where its runs differ; benches/record/equal_time.md tells what came of it.
 
 #[path = "support/equal_time/measure.rs"]
@@ -15,7 +15,7 @@ use hrr::image::{self, Image};
 use hrr::render::counters::processor_seconds;
 use hrr::render::{Silent, render};
 use hrr::settings::Settings;
-use measure::{Cost, Run, Yardstick};
+use measure::{Cost, Errors, Run, Yardstick};
 use std::path::Path;
 use std::time::Instant;
 use study::{Recipe, Variant};
@@ -76,6 +76,7 @@ fn compare(variant: &Variant, recipes: &[Recipe], budget: &Budget, directory: &P
         }
     }
     let mut rows = String::new();
+    let mut first: Option<Vec<Errors>> = None;
     for (recipe, runs) in recipes.iter().zip(&runs) {
         let yardstick = Yardstick::new(&variant.region, reference.as_deref(), runs);
         let mut sums = Vec::new();
@@ -85,6 +86,10 @@ fn compare(variant: &Variant, recipes: &[Recipe], budget: &Budget, directory: &P
             sums.push(errors);
         }
         println!("{:24} {:22} {}", variant.name, recipe.name, measure::summary(runs, &sums));
+        match &first {
+            Some(first) => println!("{:24} over the first{:8} {}", "", "", measure::ratios(first, &sums)),
+            None => first = Some(sums),
+        }
         picture(directory, &format!("{}_{}", variant.name, recipe.name), &runs[0].image);
         picture(
             directory,

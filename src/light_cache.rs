@@ -7,8 +7,10 @@ use crate::subpath::{Origin, Vertex, Walk, World};
 use glam::Vec3;
 use std::ops::Range;
 
-/// What is kept of a light vertex beside its position. The scattering model is made again from the triangle.
+/// What is kept of a light vertex beside its position, in a line of the cache. The scattering model is made again from the
+/// triangle.
 #[derive(Debug, Clone, Copy)]
+#[repr(align(64))]
 struct Record {
     triangle: u32,
     barycentric: [f32; 2],
@@ -21,6 +23,8 @@ struct Record {
     origins: [Origin; 2],
     side: Side,
 }
+
+const _: () = assert!(size_of::<Record>() == 64);
 
 /// Light vertices in the order of their subpaths. Buffers are kept between iterations.
 #[derive(Debug)]

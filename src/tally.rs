@@ -14,6 +14,8 @@ pub struct Tally {
     pub light_vertices: u64,
     /// Roulette queries and what they visited.
     pub roulette: QueryCounters,
+    /// Squares of how many light vertices each of these queries kept.
+    pub kept_squares: u64,
     /// Roulette queries over points of lights, and what they visited.
     pub emitters: QueryCounters,
     /// Shadow rays of connections of any kind.
@@ -34,6 +36,9 @@ pub struct Tally {
     pub roulette_seconds: f64,
     /// Seconds playing the roulette: in its queries, and in connections to what they keep. Part of the other sums.
     pub playing: f64,
+    /// The roulette's work in those seconds, which are those of a sample of the pixels: where it has much to do depends on the
+    /// pixel.
+    pub played_work: f64,
     /// Seconds in the eye side's shadow rays.
     pub visibility: f64,
     /// Seconds adding to the film.
@@ -47,6 +52,7 @@ impl Tally {
         self.light_subpaths += other.light_subpaths;
         self.light_vertices += other.light_vertices;
         self.roulette.add(&other.roulette);
+        self.kept_squares += other.kept_squares;
         self.emitters.add(&other.emitters);
         self.connection_rays += other.connection_rays;
         self.visible_connections += other.visible_connections;
@@ -57,6 +63,7 @@ impl Tally {
         self.eye_trace += other.eye_trace;
         self.roulette_seconds += other.roulette_seconds;
         self.playing += other.playing;
+        self.played_work += other.played_work;
         self.visibility += other.visibility;
         self.film += other.film;
     }
@@ -98,6 +105,12 @@ impl Clock {
     /// A clock that never runs.
     pub fn off() -> Self {
         Self { scale: 0.0 }
+    }
+
+    /// What something that was counted while the clock may have been off counts for.
+    #[inline]
+    pub fn count(self, n: f64) -> f64 {
+        n * self.scale
     }
 
     /// Runs `work`, adding its seconds to `sum` when this piece is timed.

@@ -6,6 +6,7 @@ use hrr::connect::EyeVertex;
 use hrr::film::Film;
 use hrr::math::{Frame, warp};
 use hrr::mis::Heuristic;
+use hrr::render::{Silent, render};
 use hrr::roulette::{Lobe, Query, QueryCounters, probability, query};
 use hrr::sampler::{Family, Purpose, Sampler, Stream};
 use hrr::settings::{AutoSwitch, Backend, Integrator, Settings};
@@ -140,5 +141,28 @@ fn as_many_emitter_vertices_are_kept_as_expected() {
             println!("{across}^2 lamps, {expected} expected: {mean} of these");
             assert!((0.5..2.0).contains(&mean), "{across}^2 lamps, {expected} expected: {mean} of these");
         }
+    }
+}
+
+/// Light is guided where the roulette has a good part of the noise, or where that is not known; not where what it finds is
+/// little and steady, as on a metal block that caustics do not fall on.
+#[test]
+fn light_is_guided_where_that_pays() {
+    for (name, guided) in [("cornell", false), ("caustic_mirror", true)] {
+        let scene = scenes::load(name, &[("film.width", "64"), ("film.height", "48")]);
+        let [auto, on, off] = [AutoSwitch::Auto, AutoSwitch::On, AutoSwitch::Off].map(|guiding| {
+            let settings = Settings {
+                integrator: Integrator::LvcHrr,
+                samples: 4,
+                light_subpaths: 1 << 17,
+                iterations: 1,
+                time: None,
+                guiding,
+                ..scene.settings.clone()
+            };
+            render(&scene, &settings, &Silent).unwrap().film.image()
+        });
+        assert!(on != off, "{name}: it makes no difference");
+        assert!(auto == if guided { on } else { off }, "{name}");
     }
 }

@@ -42,7 +42,7 @@ pub fn conductor(cos_i: f64, eta: f64, k: f64) -> f64 {
     let sin2 = (1.0 - cos_i) * (1.0 + cos_i);
     // g = a + ib = sqrt(N^2 - sin^2) for N = eta + ik, with the root taken where it does not cancel: a b = eta k.
     let (re, im) = ((eta - k) * (eta + k) - sin2, eta * k);
-    let modulus = re.hypot(2.0 * im);
+    let modulus = length(re, 2.0 * im);
     let large = (0.5 * (modulus + re.abs())).sqrt();
     let small = if large > 0.0 { im / large } else { 0.0 };
     let (a, b) = if re >= 0.0 { (large, small) } else { (small, large) };
@@ -57,6 +57,13 @@ pub fn conductor(cos_i: f64, eta: f64, k: f64) -> f64 {
 pub fn schlick(cos_i: f64, f0: Spectrum) -> Spectrum {
     let m = (1.0 - cos_i).max(0.0);
     f0 + (Spectrum::ONE - f0) * (m * m * (m * m) * m)
+}
+
+/// sqrt(x^2 + y^2), without the call where squares stay in range.
+#[inline(always)]
+fn length(x: f64, y: f64) -> f64 {
+    let square = x * x + y * y;
+    if square > 1e-280 && square < 1e300 { square.sqrt() } else { x.hypot(y) }
 }
 
 fn ratio(numerator: f64, denominator: f64) -> f64 {

@@ -9,9 +9,10 @@ use crate::math::{Spectrum, luminance};
 use crate::tally::Tally;
 use glam::DVec2;
 
-/// Most light vertices that the roulette should keep for an eye vertex on average: the price of more is that of a query, and
-/// what they bring ever less.
-const KEPT: f64 = 4.0;
+/// Most light vertices that the query which kept one should keep, on average over all that are kept: the price of more is that
+/// of a query, and what they bring ever less. Where vertices are dense, in a caustic that light is guided to, queries keep many
+/// more than elsewhere.
+const KEPT: f64 = 8.0;
 
 /// What an integrator that adapts remembers.
 #[derive(Debug)]
@@ -73,17 +74,17 @@ impl Adaptive {
     /// Learns what all parts cost.
     pub fn learn_costs(&mut self, tally: &Tally) {
         let all = tally.eye_trace + tally.roulette_seconds + tally.visibility;
+        let visit = tally.playing / tally.played_work.max(1.0);
         // What is timed in some places only may seem to be more than all.
-        let rest = (all - tally.playing).max(0.1 * all).max(1e-9);
+        let rest = (all - visit * work(tally)).max(0.1 * all).max(1e-9);
         self.sample = all / rest;
-        let rays = tally.camera_rays.max(1) as f64;
-        self.visit = tally.playing / rest * rays / work(tally).max(1.0);
+        self.visit = visit / rest * tally.camera_rays.max(1) as f64;
     }
 
     /// Learns how many light vertices the roulette kept.
     pub fn moderate(&mut self, tally: &Tally) {
-        let [queries, accepted] = [tally.roulette.queries, tally.roulette.accepted].map(|n| n as f64);
-        self.kept *= (KEPT * queries / accepted.max(1.0)).min(1.0);
+        let [accepted, squares] = [tally.roulette.accepted, tally.kept_squares].map(|n| n as f64);
+        self.kept *= (KEPT * accepted / squares.max(1.0)).min(1.0);
     }
 
     /// Plans iterations to come.

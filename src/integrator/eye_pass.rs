@@ -5,7 +5,7 @@ use super::parts::{self, Part, Parts};
 use super::recipe::Base;
 use super::records::{self, Records};
 use super::tile::{self, Sample};
-use super::watched::Seen;
+use super::watched::{Seen, work};
 use crate::connect::{EyeVertex, Onward};
 use crate::film::Film;
 use crate::math::Spectrum;
@@ -67,6 +67,18 @@ impl Bidirectional<'_> {
 
     /// What an eye sample sees.
     pub(super) fn radiance(&self, sample: &Sample, clock: Clock, tally: &mut Tally) -> Seen {
+        self.radiance_and(sample, clock, tally, &mut |_, _| ())
+    }
+
+    /// As [`Bidirectional::radiance`]; visits each light vertex that the roulette kept, with its value.
+    #[inline(always)]
+    pub(super) fn radiance_and(
+        &self,
+        sample: &Sample,
+        clock: Clock,
+        tally: &mut Tally,
+        visit: &mut impl FnMut(u32, Spectrum),
+    ) -> Seen {
         let (world, techniques) = (self.world, &self.techniques);
         let (mut rest, mut kept) = (Spectrum::ZERO, Spectrum::ZERO);
         let mut eye = EyeVertex::first(world, techniques, sample.raster, &sample.sampler);
@@ -80,11 +92,15 @@ impl Bidirectional<'_> {
                 if !vertex.lobes.is_empty() {
                     rest += self.play_emitters(&vertex, &sample.sampler, clock, tally);
                     if sample.plays > 0.0 {
-                        let (sampler, mut seconds) = (&sample.sampler, 0.0);
+                        let (sampler, before, mut seconds) = (&sample.sampler, work(tally), 0.0);
                         clock.time(&mut seconds, || {
-                            self.play_roulette(&vertex, sampler, clock, tally, &mut |_, value| kept += value);
+                            self.play_roulette(&vertex, sampler, clock, tally, &mut |light, value| {
+                                kept += value;
+                                visit(light, value);
+                            });
                         });
                         tally.playing += seconds;
+                        tally.played_work += clock.count(work(tally) - before);
                     }
                 } else {
                     rest += match self.recipe.base {
@@ -221,6 +237,7 @@ impl Bidirectional<'_> {
         clock.time(roulette_seconds, || {
             roulette::query(&self.bvh, &query, counters, &mut |index, p| kept.push((index, p)));
         });
+        tally.kept_squares += (kept.len() as u64).pow(2);
         for (index, p) in kept {
             if depth + 1 + self.cache.depth(index as usize) <= self.settings.max_depth {
                 let light = self.cache.load(self.world, index as usize);

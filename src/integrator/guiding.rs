@@ -2,11 +2,13 @@
 //! connections of these bring to the image, by the direction in which their light left.
 
 use super::bidirectional::Bidirectional;
-use crate::connect::EyeVertex;
+use super::tile::Sample;
+use super::watched::{Need, PixelSums, Seen, roulette_share};
 use crate::error::Result;
 use crate::light::EmissionGuide;
 use crate::math::luminance;
 use crate::sampler::{Family, Purpose, Sampler, Stream};
+use crate::settings::AutoSwitch;
 use crate::subpath::from_light;
 use crate::tally::{Clock, Tally};
 use glam::DVec2;
@@ -20,6 +22,23 @@ const EYE_SUBPATHS: (u64, u64) = (1 << 12, 1 << 17);
 const GROWTH: u64 = 4;
 /// Eye subpaths of one task.
 const CHUNK: u64 = 1024;
+/// Side of the squares of pixels that are looked at as a whole.
+const REGION: u32 = 8;
+/// The roulette's share of the noise, without guiding, below which nothing is guided: what is sent where the roulette finds it
+/// is missing elsewhere (benches/record/integrators.md).
+const WORTH: f64 = 0.02;
+/// Light vertices among which what was found must be spread for that share to be believed: caustics that were hardly met yet
+/// seem to be little.
+const SPREAD: f64 = 100.0;
+
+/// What eye subpaths of the pre-pass saw.
+#[derive(Default)]
+struct Observed {
+    /// Light vertices that the roulette kept, and what they brought.
+    found: Vec<(u32, f64)>,
+    /// For each eye subpath the region, and what it saw.
+    seen: Vec<(u32, Seen)>,
+}
 
 impl Bidirectional<'_> {
     /// Learns from a pre-pass, unless one of about the size that is due has been learned from before. It depends on the
@@ -40,40 +59,56 @@ impl Bidirectional<'_> {
         self.light_pass(Stream::GuideLight, 0, None, &|_| ());
         self.build_trees(Stream::GuideLight, 0)?;
         // Collected in order: sums must not depend on threads.
-        let found: Vec<Vec<(u32, f64)>> = (0..eye_subpaths / CHUNK)
+        let observed: Vec<Observed> = (0..eye_subpaths / CHUNK)
             .into_par_iter()
             .map(|chunk| {
-                let mut found = Vec::new();
-                (chunk * CHUNK..(chunk + 1) * CHUNK).for_each(|index| self.observe(index, &mut found));
-                found
+                let mut observed = Observed::default();
+                (chunk * CHUNK..(chunk + 1) * CHUNK).for_each(|index| self.observe(index, &mut observed));
+                observed
             })
             .collect();
+        let worth = self.settings.guiding == AutoSwitch::On || self.is_worth_guiding(&observed);
         let (world, seed) = (self.world, self.settings.seed);
-        let observations = found.into_iter().flatten().filter_map(|(vertex, score)| {
+        let observations = observed.iter().flat_map(|o| &o.found).filter_map(|&(vertex, score)| {
             let subpath = self.cache.subpath_of(vertex as usize) as u64;
             let sampler = Family::new(seed, 0, Stream::GuideLight, subpath >> 32).member(subpath as u32);
             let (light, u) = from_light::start(world, None, &sampler)?;
             Some((light, u, score))
         });
-        self.techniques.guide = EmissionGuide::learn(&world.lights, observations).map(Arc::new);
+        if worth {
+            self.techniques.guide = EmissionGuide::learn(&world.lights, observations).map(Arc::new);
+        }
         self.size = size;
         Ok(())
     }
 
+    /// Whether guiding gains more than it costs, as far as is known.
+    fn is_worth_guiding(&self, observed: &[Observed]) -> bool {
+        let found = observed.iter().flat_map(|o| &o.found).map(|(_, value)| value);
+        let (sum, squares) = found.fold((0.0, 0.0), |(sum, squares), v| (sum + v, squares + v * v));
+        if sum * sum < SPREAD * squares {
+            return true;
+        }
+        let film = &self.world.scene.film;
+        let regions = film.width.div_ceil(REGION) * film.height.div_ceil(REGION);
+        let mut regions = vec![PixelSums::default(); regions as usize];
+        for (region, seen) in observed.iter().flat_map(|o| &o.seen) {
+            regions[*region as usize].add(seen, 1.0, 0.0);
+        }
+        let needs: Vec<Need> = regions.iter().map(PixelSums::need).collect();
+        roulette_share(&needs) >= WORTH
+    }
+
     /// What light vertices give to an eye subpath through the roulette.
-    fn observe(&self, index: u64, found: &mut Vec<(u32, f64)>) {
-        let (world, film) = (self.world, &self.world.scene.film);
+    fn observe(&self, index: u64, observed: &mut Observed) {
+        let film = &self.world.scene.film;
         let sampler = Sampler::new(self.settings.seed, 0, Stream::GuideEye, index);
         let raster = sampler.u2(0, Purpose::Raster) * DVec2::new(film.width.into(), film.height.into());
-        let mut eye = EyeVertex::first(world, &self.techniques, raster, &sampler).vertex();
-        let mut tally = Tally::default();
-        while let Some(vertex) = eye.filter(|v| v.walk.depth < self.settings.max_depth) {
-            if !vertex.lobes.is_empty() {
-                self.play_roulette(&vertex, &sampler, Clock::off(), &mut tally, &mut |light, value| {
-                    found.push((light, luminance(value)));
-                });
-            }
-            eye = vertex.next(world, &self.techniques, &sampler).vertex();
-        }
+        let region = raster.y as u32 / REGION * film.width.div_ceil(REGION) + raster.x as u32 / REGION;
+        let sample = Sample { raster, index, sampler, plays: 1.0 };
+        let seen = self.radiance_and(&sample, Clock::off(), &mut Tally::default(), &mut |light, value| {
+            observed.found.push((light, luminance(value)));
+        });
+        observed.seen.push((region, seen));
     }
 }

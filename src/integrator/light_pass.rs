@@ -19,7 +19,7 @@ const CHUNK: u64 = 1024;
 /// Light subpaths of the pre-pass that estimates how many vertices one leaves.
 const PILOT: u64 = 16 * CHUNK;
 /// Light subpaths whose vertices all are kept for uniform picks: enough for eye samples not to share many.
-const PICKED: u64 = 256 * CHUNK;
+const PICKED: u64 = 64 * CHUNK;
 impl Bidirectional<'_> {
     /// How many vertices a light subpath leaves in the roulette's cache, and in that of all.
     pub(super) fn vertices_per_subpath(&self) -> [f64; 2] {

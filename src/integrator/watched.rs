@@ -67,7 +67,8 @@ impl PixelSums {
         self
     }
 
-    fn need(&self) -> Need {
+    /// What they say of the pixel.
+    pub fn need(&self) -> Need {
         let n = self.samples.max(1.0);
         let variance = |sums: [f64; 2]| (sums[1] / n - (sums[0] / n).powi(2)).max(0.0);
         Need {
@@ -183,6 +184,16 @@ pub(super) fn weights(needs: &[Need]) -> Vec<f64> {
     needs.iter().map(|n| 1.0 / (n.mean + floor)).collect()
 }
 
+/// The roulette's share of the variance of samples relative to the pixels' brightness, over all pixels.
+pub(super) fn roulette_share(needs: &[Need]) -> f64 {
+    let (mut roulette, mut all) = (0.0, 0.0);
+    for (weight, need) in weights(needs).iter().zip(needs) {
+        roulette += weight * weight * need.roulette;
+        all += weight * weight * (need.roulette + need.rest);
+    }
+    if all > 0.0 { roulette / all } else { 0.0 }
+}
+
 #[cfg(test)]
 pub(super) mod tests {
     use super::*;
@@ -215,6 +226,27 @@ pub(super) mod tests {
             assert!((need.mean - 1.0).abs() < 1e-12 && (need.work - 7.0).abs() < 1e-12, "{need:?}");
         }
         assert!(Watched::new(4, 4).needs().is_none());
+    }
+
+    #[test]
+    fn the_roulette_has_its_share_of_the_noise() {
+        for (roulette, rest, share) in [(0.3, 0.1, 0.9), (0.0, 0.1, 0.0), (0.0, 0.0, 0.0)] {
+            let got = roulette_share(&watched(|_| (roulette, rest), 0.0).needs().unwrap());
+            assert!((got - share).abs() < 1e-12, "{got}");
+        }
+        // Relative to brightness: two halves of one noise, of which that with the roulette is the darker by 1 to 3.
+        let mut sums = [PixelSums::default(); 2];
+        for sign in [-1.0, 1.0, -1.0, 1.0] {
+            let seen = |mean: f64, roulette: f64, rest: f64| Seen {
+                radiance: Spectrum::splat(mean + sign * (roulette + rest)),
+                roulette: Spectrum::splat(sign * roulette),
+            };
+            sums[0].add(&seen(1.0, 0.1, 0.0), 1.0, 0.0);
+            sums[1].add(&seen(3.0, 0.0, 0.1), 1.0, 0.0);
+        }
+        let got = roulette_share(&sums.map(|s| s.need()));
+        let square = |mean: f64| 1.0 / (mean + 0.02 * 2.0f64).powi(2);
+        assert!((got - square(1.0) / (square(1.0) + square(3.0))).abs() < 1e-12, "{got}");
     }
 
     #[test]

@@ -2,7 +2,7 @@
 
 use super::lobe::Lobe;
 use crate::math::Frame;
-use glam::DVec3;
+use glam::{DVec2, DVec3};
 use std::f64::consts::PI;
 
 /// How much the range is widened at grazing angles: `cos` becomes `cos + k alpha sin` in the warp's Jacobian.
@@ -115,9 +115,9 @@ impl Vertex {
         let bounded = |alpha: f64| if alpha > MIN_GGX_ALPHA { alpha.min(1.0) } else { MIN_GGX_ALPHA }; // NaN too
         let (alpha_x, alpha_y) = (bounded(alpha_x), bounded(alpha_y));
         let wo = frame.to_local(wo);
-        let sin = wo.x.hypot(wo.y);
+        let sin = DVec2::new(wo.x, wo.y).length();
         let (px, py) = if sin > 0.0 { (wo.x / sin, wo.y / sin) } else { (1.0, 0.0) };
-        let alpha_in = (px * alpha_x).hypot(py * alpha_y);
+        let alpha_in = DVec2::new(px * alpha_x, py * alpha_y).length();
         Self { wo, cos: wo.z.max(1e-12), sin, px, py, alpha_x, alpha_y, alpha_in }
     }
 
@@ -156,12 +156,12 @@ impl Vertex {
 /// The smaller value comes from the determinant: at grazing angles it is up to 1e24 times less than the larger.
 fn eigen(a: f64, b: f64, d: f64, det: f64) -> (f64, f64, (f64, f64)) {
     let half_gap = 0.5 * (a - d);
-    let root = half_gap.hypot(b);
+    let root = DVec2::new(half_gap, b).length();
     let large = 0.5 * (a + d) + root;
     let small = if large > 0.0 { (det / large).max(0.0) } else { 0.0 };
     // (a - large) v.x + b v.y = 0 for the larger one's vector; the smaller one's is perpendicular.
     let (x, y) = if half_gap >= 0.0 { (root + half_gap, b) } else { (b, root - half_gap) };
-    let len = x.hypot(y);
+    let len = DVec2::new(x, y).length();
     let (c, s) = if len > 0.0 { (x / len, y / len) } else { (0.0, 1.0) };
     (small, large, (-s, c))
 }

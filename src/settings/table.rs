@@ -270,8 +270,9 @@ pub const TABLE: &[Setting] = &[
         heading: TRANSPORT,
         help: "Whether emitters send light (+hrr) where a pre-pass found it useful",
         doc: "on: towards what reaches the image by way of surfaces where the roulette plays; two directions \
-              of three stay as they are without. off: by the cosine alone. auto: on, but off beside vertex merging, \
-              which wants light everywhere.",
+              of three stay as they are without. off: by the cosine alone. auto: on, but off where the pre-pass \
+              finds that the roulette has little part in the image's noise, and beside vertex merging, which wants \
+              light everywhere.",
     },
     Setting {
         name: "adaptive",

@@ -149,6 +149,22 @@ pub fn row(variant: &Variant, recipe: &Recipe, seed: usize, cost: &Cost, errors:
     )
 }
 
+/// Means of runs over those of other runs, in turn with them, with 90 % intervals.
+pub fn ratios(first: &[Errors], errors: &[Errors]) -> String {
+    let over = |value: &dyn Fn(&Errors) -> f64| {
+        let sum = |of: &[Errors], chosen: &[usize]| chosen.iter().map(|&r| value(&of[r])).sum::<f64>();
+        let i = Interval::new(first.len(), |chosen| sum(errors, chosen) / sum(first, chosen));
+        format!("{:.4} [{:.4}, {:.4}]", i.value, i.low, i.high)
+    };
+    format!(
+        "mean {}; MSE {}; region {}; relative {}",
+        over(&|e| e.mean),
+        over(&|e| e.mse),
+        over(&|e| e.region_mse),
+        over(&|e| e.trimmed),
+    )
+}
+
 /// Means over runs, with 90 % intervals.
 pub fn summary(runs: &[Run], errors: &[Errors]) -> String {
     let over = |value: &dyn Fn(usize) -> f64| {

@@ -2,7 +2,7 @@
 
 use hrr::material::{Material, Scattering};
 use hrr::scene::Scene;
-use hrr::settings::{Integrator, Range, Settings};
+use hrr::settings::{AutoSwitch, Integrator, Range, Settings, Switch};
 use hrr::subpath::World;
 use std::path::Path;
 
@@ -37,6 +37,34 @@ const LVC_HRR: Recipe = Recipe { name: "lvc+hrr", set: |s| Settings { integrator
 /// What the others are judged by: as many light subpaths as there is time for, whatever the scene sets.
 const REFEREE: Recipe =
     Recipe { name: "lvc+hrr", set: |s| Settings { integrator: Integrator::LvcHrr, light_subpaths: 0, ..s } };
+/// What `auto` does, and the same without one of the additions to the plain recipe, and without any.
+const ALL: Recipe = Recipe { name: "all", set: |s| s };
+const UNGUIDED: Recipe = Recipe { name: "guiding off", set: |s| Settings { guiding: AutoSwitch::Off, ..s } };
+const ALL_STORED: Recipe = Recipe { name: "all stored", set: |s| Settings { storing: 1.0, ..s } };
+const UNSPREAD: Recipe = Recipe { name: "adaptive off", set: |s| Settings { adaptive: Switch::Off, ..s } };
+const SMALL: Recipe = Recipe { name: "small iterations", set: small };
+const PLAIN: Recipe = Recipe {
+    name: "plain",
+    set: |s| Settings { guiding: AutoSwitch::Off, storing: 1.0, adaptive: Switch::Off, ..small(s) },
+};
+
+/// What judges these: other connections, and none of the additions but large iterations.
+const UNADDED: Recipe = Recipe {
+    name: "pcbpt+hrr",
+    set: |s| Settings {
+        integrator: Integrator::PcbptHrr,
+        guiding: AutoSwitch::Off,
+        storing: 1.0,
+        adaptive: Switch::Off,
+        ..s
+    },
+};
+
+/// One sample of each pixel in every iteration, and about as many light subpaths.
+fn small(settings: Settings) -> Settings {
+    Settings { samples: 1, light_subpaths: 30_000, ..settings }
+}
+
 const PCVCM: Recipe = Recipe { name: "pcvcm", set: |s| Settings { integrator: Integrator::Pcvcm, ..s } };
 const PCVCM_HRR: Recipe =
     Recipe { name: "pcvcm+hrr", set: |s| Settings { integrator: Integrator::PcvcmHrr, ..s } };
@@ -57,6 +85,14 @@ pub fn of(study: &str, size: [u32; 2]) -> Option<(Vec<Variant>, Vec<Recipe>)> {
         "graceful" => (graceful(size), vec![LVC, LVC_HRR]),
         // The same beside probabilistic connections.
         "graceful_pc" => (graceful(size), vec![PCBPT, PCBPT_HRR]),
+        // What each addition to the plain recipe gains, and that it keeps the energy.
+        "additions" => {
+            let judged = |s: &&str| Variant { referee: Some(UNADDED), ..variant(load(s), "mirror") };
+            (
+                SCENES.iter().chain(&["specular_room"]).map(judged).collect(),
+                vec![ALL, UNGUIDED, ALL_STORED, UNSPREAD, SMALL, PLAIN],
+            )
+        }
         // How errors fall with time.
         "convergence" => {
             let scenes = ["caustic_mirror", "cornell"];
@@ -73,17 +109,19 @@ pub fn of(study: &str, size: [u32; 2]) -> Option<(Vec<Variant>, Vec<Recipe>)> {
     })
 }
 
+/// The project's scenes whose paths the roulette alone finds.
+const SCENES: [&str; 7] = [
+    "cornell",
+    "caustic_mirror",
+    "caustic_mirror_aniso",
+    "glass_caustic",
+    "mirror_room",
+    "brushed_funnel",
+    "glossy_corridor",
+];
+
 fn graceful(size: [u32; 2]) -> Vec<Variant> {
-    let plain = [
-        "cornell",
-        "caustic_mirror",
-        "caustic_mirror_aniso",
-        "glass_caustic",
-        "mirror_room",
-        "brushed_funnel",
-        "glossy_corridor",
-    ];
-    let mut variants: Vec<Variant> = plain.iter().map(|name| judged(load(name, size), "mirror")).collect();
+    let mut variants: Vec<Variant> = SCENES.iter().map(|name| judged(load(name, size), "mirror")).collect();
     let mut change = |name: &str, scene: &str, change: fn(&mut Scene)| {
         let mut scene = load(scene, size);
         change(&mut scene);
