@@ -34,6 +34,8 @@ pub struct Bidirectional<'a> {
     pub(super) size: Size,
     /// Light subpaths that the emission guide was learned from; 0 before.
     pub(super) guided_by: u64,
+    /// Whether guiding gains more than it costs, as far as the last pre-pass knew.
+    pub(super) guiding_pays: bool,
     /// Radius of merging in the first iteration, world units.
     first_radius: f64,
     /// Light vertices for the roulette, or all where it is off.
@@ -65,6 +67,7 @@ impl<'a> Bidirectional<'a> {
             techniques: Techniques::none(settings.mis),
             size: Size { samples: 0, light_subpaths: 0 },
             guided_by: 0,
+            guiding_pays: true,
             first_radius: if recipe.merging { merging::first_radius(world, settings) } else { 0.0 },
             cache: LightCache::default(),
             bvh: VertexBvh::new(),

@@ -15,7 +15,9 @@ use glam::DVec2;
 use rayon::prelude::*;
 use std::sync::Arc;
 
-/// Light subpaths of the pre-pass, and eye subpaths: an eighth of an iteration's, within these bounds.
+/// Part of an iteration's subpaths that the pre-pass has, and where the one before found that guiding does not pay.
+const PARTS: [u32; 2] = [8, 64];
+/// Light subpaths of the pre-pass, and eye subpaths, at least and at most.
 const LIGHT_SUBPATHS: (u64, u64) = (1 << 12, 1 << 18);
 const EYE_SUBPATHS: (u64, u64) = (1 << 12, 1 << 17);
 /// How much larger a pre-pass must be to be worth its while after another.
@@ -47,8 +49,9 @@ impl Bidirectional<'_> {
         let size = self.size;
         let film = &self.world.scene.film;
         let samples = u64::from(film.width) * u64::from(film.height) * u64::from(size.samples);
-        let eye_subpaths = (samples / 8).clamp(EYE_SUBPATHS.0, EYE_SUBPATHS.1);
-        let light_subpaths = (size.light_subpaths / 8).clamp(LIGHT_SUBPATHS.0, LIGHT_SUBPATHS.1);
+        let part = u64::from(PARTS[usize::from(!self.guiding_pays)]);
+        let eye_subpaths = (samples / part).clamp(EYE_SUBPATHS.0, EYE_SUBPATHS.1);
+        let light_subpaths = (size.light_subpaths / part).clamp(LIGHT_SUBPATHS.0, LIGHT_SUBPATHS.1);
         if light_subpaths < GROWTH * self.guided_by {
             return Ok(());
         }
@@ -67,7 +70,7 @@ impl Bidirectional<'_> {
                 observed
             })
             .collect();
-        let worth = self.settings.guiding == AutoSwitch::On || self.is_worth_guiding(&observed);
+        self.guiding_pays = self.settings.guiding == AutoSwitch::On || self.does_guiding_pay(&observed);
         let (world, seed) = (self.world, self.settings.seed);
         let observations = observed.iter().flat_map(|o| &o.found).filter_map(|&(vertex, score)| {
             let subpath = self.cache.subpath_of(vertex as usize) as u64;
@@ -75,7 +78,7 @@ impl Bidirectional<'_> {
             let (light, u) = from_light::start(world, None, &sampler)?;
             Some((light, u, score))
         });
-        if worth {
+        if self.guiding_pays {
             self.techniques.guide = EmissionGuide::learn(&world.lights, observations).map(Arc::new);
         }
         self.size = size;
@@ -83,7 +86,7 @@ impl Bidirectional<'_> {
     }
 
     /// Whether guiding gains more than it costs, as far as is known.
-    fn is_worth_guiding(&self, observed: &[Observed]) -> bool {
+    fn does_guiding_pay(&self, observed: &[Observed]) -> bool {
         let found = observed.iter().flat_map(|o| &o.found).map(|(_, value)| value);
         let (sum, squares) = found.fold((0.0, 0.0), |(sum, squares), v| (sum + v, squares + v * v));
         if sum * sum < SPREAD * squares {
