@@ -36,8 +36,8 @@ pub struct Tally {
     pub roulette_seconds: f64,
     /// Seconds playing the roulette: in its queries, and in connections to what they keep. Part of the other sums.
     pub playing: f64,
-    /// The roulette's work in those seconds, which are those of a sample of the pixels: where it has much to do depends on the
-    /// pixel.
+    /// The roulette's work in those seconds alone, scaled up as they are: they are those of a sample of the tiles, and what it has
+    /// to do differs by tile.
     pub played_work: f64,
     /// Seconds in the eye side's shadow rays.
     pub visibility: f64,

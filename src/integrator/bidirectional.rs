@@ -83,7 +83,7 @@ impl<'a> Bidirectional<'a> {
         Ok(machine)
     }
 
-    /// Whether light subpaths follow what a pre-pass found useful. What merging finds is on all surfaces, and noisier where
+    /// Whether light subpaths follow what a pre-pass found useful, if that says that it pays. What merging finds is on all surfaces, and noisier where
     /// fewer of them go.
     fn is_guided(&self) -> bool {
         self.recipe.roulette && self.settings.guiding.is_on(|| !self.recipe.merging)

@@ -60,7 +60,7 @@ const UNADDED: Recipe = Recipe {
     },
 };
 
-/// One sample of each pixel in every iteration, and about as many light subpaths.
+/// One sample of each pixel in every iteration, and as many light subpaths as 200 x 150 pixels.
 fn small(settings: Settings) -> Settings {
     Settings { samples: 1, light_subpaths: 30_000, ..settings }
 }
@@ -109,7 +109,7 @@ pub fn of(study: &str, size: [u32; 2]) -> Option<(Vec<Variant>, Vec<Recipe>)> {
     })
 }
 
-/// The project's scenes whose paths the roulette alone finds.
+/// The project's scenes with a rough metal to play the roulette at.
 const SCENES: [&str; 7] = [
     "cornell",
     "caustic_mirror",
