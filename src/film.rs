@@ -6,9 +6,10 @@
 use crate::error::{Error, Result};
 use crate::image::Image;
 use crate::math::Spectrum;
+use crate::outliers::{self, Largest};
 use glam::{DVec2, Vec3};
-use std::sync::Mutex;
 use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Mutex, MutexGuard};
 
 /// Units per 1.0: values are kept to 5e-20, sums up to 9e18.
 const ONE: f64 = (1u128 << 64) as f64;
@@ -44,13 +45,23 @@ pub enum Filter {
     Gaussian,
 }
 
+/// A row of pixels.
+#[derive(Debug)]
+struct Row {
+    sums: Vec<Pixel>,
+    /// The largest contributions to each; empty where they are not watched.
+    largest: Vec<Largest>,
+}
+
 /// A sum of samples for every pixel.
 #[derive(Debug)]
 pub struct Film {
     width: u32,
     height: u32,
     filter: Filter,
-    rows: Vec<Mutex<Vec<Pixel>>>,
+    rows: Vec<Mutex<Row>>,
+    /// Whether the largest contributions are remembered.
+    outliers: bool,
     samples: u64,
     /// What each sample to come counts for.
     weight: u32,
@@ -62,17 +73,32 @@ pub struct Film {
 impl Film {
     /// A black film of no samples.
     pub fn new(settings: &FilmSettings) -> Self {
-        let row = || Mutex::new(vec![[0; 3]; settings.width as usize]);
+        Self::watching(settings, false)
+    }
+
+    /// The same; `outliers`: whether it remembers what tells these ([`Film::without_outliers`]), 48 bytes a pixel.
+    pub fn watching(settings: &FilmSettings, outliers: bool) -> Self {
+        let width = settings.width as usize;
+        let largest = if outliers { width } else { 0 };
+        let row =
+            || Mutex::new(Row { sums: vec![[0; 3]; width], largest: vec![Largest::default(); largest] });
         Self {
             width: settings.width,
             height: settings.height,
             filter: settings.filter,
             rows: (0..settings.height).map(|_| row()).collect(),
+            outliers,
             samples: 0,
             weight: 1,
             weights: 0,
             dropped: AtomicU64::new(0),
         }
+    }
+
+    /// A black film of the same kind.
+    pub fn alike(&self) -> Self {
+        let Self { width, height, filter, outliers, .. } = *self;
+        Self::watching(&FilmSettings { width, height, filter }, outliers)
     }
 
     /// Pixels across.
@@ -116,15 +142,18 @@ impl Film {
     pub fn add_samples(&self, x: u32, y: u32, samples: impl Iterator<Item = (DVec2, Spectrum)>) {
         match self.filter {
             Filter::Box => {
-                let mut sum = Spectrum::ZERO;
+                let (mut sum, mut largest) = (Spectrum::ZERO, Largest::default());
                 for (_, value) in samples {
                     if value.is_finite() {
                         sum += value;
+                        if self.outliers {
+                            largest.add(value);
+                        }
                     } else {
                         self.dropped.fetch_add(1, Ordering::Relaxed);
                     }
                 }
-                self.add_pixel(x, y, sum);
+                self.add_pixel(x, y, sum, &largest);
             }
             Filter::Gaussian => samples.for_each(|(raster, value)| self.add(raster, value)),
         }
@@ -140,7 +169,7 @@ impl Film {
             return;
         }
         match self.filter {
-            Filter::Box => self.add_pixel(raster.x as u32, raster.y as u32, value),
+            Filter::Box => self.add_one(raster.x as u32, raster.y as u32, value),
             Filter::Gaussian => self.add_gaussian(raster, value),
         }
     }
@@ -160,18 +189,29 @@ impl Film {
         };
         for (y, wy) in axis(raster.y, self.height) {
             for (x, wx) in axis(raster.x, self.width) {
-                self.add_pixel(x, y, value * (wx * wy));
+                self.add_one(x, y, value * (wx * wy));
             }
         }
     }
 
-    fn add_pixel(&self, x: u32, y: u32, value: Spectrum) {
-        let (x, y) = (x.min(self.width - 1), y.min(self.height - 1));
-        let scale = ONE * f64::from(self.weight);
-        let fixed = value.to_array().map(|v| (v * scale) as i128);
-        let mut row = self.rows[y as usize].lock().unwrap_or_else(|poisoned| poisoned.into_inner());
-        for (sum, v) in row[x as usize].iter_mut().zip(fixed) {
+    /// Adds one contribution.
+    fn add_one(&self, x: u32, y: u32, value: Spectrum) {
+        let mut largest = Largest::default();
+        largest.add(value);
+        self.add_pixel(x, y, value, &largest);
+    }
+
+    /// Adds the sum of contributions, of which these are the largest.
+    fn add_pixel(&self, x: u32, y: u32, sum: Spectrum, largest: &Largest) {
+        let (x, y) = (x.min(self.width - 1) as usize, y.min(self.height - 1));
+        let weight = f64::from(self.weight);
+        let fixed = sum.to_array().map(|v| (v * (ONE * weight)) as i128);
+        let mut row = lock(&self.rows[y as usize]);
+        for (sum, v) in row.sums[x].iter_mut().zip(fixed) {
             *sum = sum.saturating_add(v);
+        }
+        if let Some(pixel) = row.largest.get_mut(x) {
+            pixel.add_scaled(largest, weight);
         }
     }
 
@@ -183,13 +223,7 @@ impl Film {
                 other.width, other.height, self.width, self.height
             )));
         }
-        for (row, other) in self.rows.iter_mut().zip(&other.rows) {
-            let row = row.get_mut().unwrap_or_else(|poisoned| poisoned.into_inner());
-            let other = other.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
-            for (sum, v) in row.iter_mut().flatten().zip(other.iter().flatten()) {
-                *sum = sum.saturating_add(*v);
-            }
-        }
+        self.add_rows(other, |v| v, 1.0);
         self.samples += other.samples;
         self.weights += other.weights;
         *self.dropped.get_mut() += other.dropped();
@@ -199,26 +233,32 @@ impl Film {
     /// Adds what another film of the same size has, times a factor, as samples that are counted elsewhere.
     pub fn add_scaled(&self, other: &Film, factor: f64) {
         let scale = factor * f64::from(self.weight);
+        self.add_rows(other, |v| (v as f64 * scale) as i128, scale);
+        self.dropped.fetch_add(other.dropped(), Ordering::Relaxed);
+    }
+
+    fn add_rows(&self, other: &Film, scaled: impl Fn(i128) -> i128, scale: f64) {
         for (row, other) in self.rows.iter().zip(&other.rows) {
-            let mut row = row.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
-            let other = other.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
-            for (sum, v) in row.iter_mut().flatten().zip(other.iter().flatten()) {
-                *sum = sum.saturating_add((*v as f64 * scale) as i128);
+            let (mut row, other) = (lock(row), lock(other));
+            for (sum, &v) in row.sums.iter_mut().flatten().zip(other.sums.iter().flatten()) {
+                *sum = sum.saturating_add(scaled(v));
+            }
+            for (pixel, largest) in row.largest.iter_mut().zip(&other.largest) {
+                pixel.add_scaled(largest, scale);
             }
         }
-        self.dropped.fetch_add(other.dropped(), Ordering::Relaxed);
     }
 
     /// The sums of a row of pixels, in double precision.
     pub fn row(&self, y: u32) -> Vec<Spectrum> {
-        let row = self.rows[y as usize].lock().unwrap_or_else(|poisoned| poisoned.into_inner());
-        row.iter().map(|sums| Spectrum::from_array(sums.map(|v| v as f64 / ONE))).collect()
+        let row = lock(&self.rows[y as usize]);
+        row.sums.iter().map(|sums| Spectrum::from_array(sums.map(|v| v as f64 / ONE))).collect()
     }
 
     /// The mean of a pixel, in double precision.
     pub fn mean(&self, x: u32, y: u32) -> Spectrum {
-        let row = self.rows[y as usize].lock().unwrap_or_else(|poisoned| poisoned.into_inner());
-        Spectrum::from_array(row[x as usize].map(|v| v as f64 / (ONE * self.weights.max(1) as f64)))
+        let row = lock(&self.rows[y as usize]);
+        Spectrum::from_array(row.sums[x as usize].map(|v| v as f64 / (ONE * self.weights.max(1) as f64)))
     }
 
     /// The image so far: weighted means of the samples; black when there are none.
@@ -227,6 +267,25 @@ impl Film {
             (0..self.height).flat_map(|y| (0..self.width).map(move |x| self.mean(x, y).as_vec3())).collect();
         Image { width: self.width, height: self.height, pixels }
     }
+
+    /// The image so far without outliers, which is biased; `None` where these were not watched.
+    pub fn without_outliers(&self) -> Option<Image> {
+        if !self.outliers {
+            return None;
+        }
+        let sums: Vec<Spectrum> = (0..self.height).flat_map(|y| self.row(y)).collect();
+        let largest: Vec<Largest> = self.rows.iter().flat_map(|row| lock(row).largest.clone()).collect();
+        let excess = outliers::excess(self.width as usize, &sums, &largest);
+        let weights = self.weights.max(1) as f64;
+        let pixels =
+            sums.iter().zip(excess).map(|(&sum, excess)| ((sum - excess) * (1.0 / weights)).as_vec3());
+        Some(Image { width: self.width, height: self.height, pixels: pixels.collect() })
+    }
+}
+
+/// Rows are whole between additions, so that a panic elsewhere does not matter.
+fn lock(row: &Mutex<Row>) -> MutexGuard<'_, Row> {
+    row.lock().unwrap_or_else(|poisoned| poisoned.into_inner())
 }
 
 #[cfg(test)]

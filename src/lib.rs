@@ -17,6 +17,7 @@ pub mod bsdf;
 pub mod material;
 pub mod light;
 pub mod camera;
+pub mod outliers;
 pub mod film;
 
 pub mod scene;

@@ -188,6 +188,25 @@ fn images_and_statistics_are_written() {
 }
 
 #[test]
+fn an_image_without_outliers_is_marked_and_the_plain_one_stands_beside_it() {
+    let place = Place::new();
+    let (code, _, err) = place.run("render scene.toml -o a.exr --outlier-rejection on --stats s.json");
+    assert_eq!(code, 0, "{err}");
+    assert!(err.contains("outliers are rejected, which is biased; with them: a.plain.exr"), "{err}");
+    let biased = |name: &str| image::read_attributes(&place.path(name)).unwrap().get("hrr:biased").cloned();
+    assert_eq!((biased("a.exr"), biased("a.plain.exr")), (Some(Value::Int(1)), Some(Value::Int(0))));
+    let stats: serde_json::Value = serde_json::from_slice(&fs::read(place.path("s.json")).unwrap()).unwrap();
+    assert_eq!(stats["biased"], true);
+    place.run("render scene.toml -o b.exr");
+    let read = |name: &str| image::read(&place.path(name)).unwrap();
+    assert_eq!(read("a.plain.exr"), read("b.exr"));
+
+    fs::create_dir(place.path("c.plain.exr")).unwrap();
+    let (code, _, err) = place.run("render scene.toml -o c.exr --outlier-rejection on");
+    assert!(code == 4 && err.contains("c.plain.exr") && !place.path("c.exr").exists(), "{code}: {err}");
+}
+
+#[test]
 fn statistics_on_stdout_have_the_contracts_names_and_no_others() {
     let place = Place::new();
     let (code, out, _) = place.run("render scene.toml -o a.exr --stats -");

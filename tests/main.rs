@@ -19,6 +19,7 @@ mod closed_form;
 mod ray_offset;
 mod visibility;
 mod determinism;
+mod outliers;
 mod effects;
 mod layers;
 mod mis;

@@ -23,7 +23,7 @@ use std::sync::Arc;
 /// Numbers with no special relation to each other.
 const TECHNIQUES: Techniques = Techniques {
     heuristic: Heuristic::Balance,
-    eye_hits: 1.0,
+    eye_hits: hrr::mis::EYE_HITS,
     next_event: 1.0,
     light_image: 700.0,
     base: 1.7,

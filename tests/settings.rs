@@ -38,6 +38,7 @@ fn other_value(name: &str) -> &'static str {
         "iterations" => "9",
         "memory" => "3.5",
         "adaptive" => "off",
+        "outlier_rejection" => "on",
         "time" => "30.5",
         "error" => "0.25",
         "first_iteration" => "64",
@@ -90,6 +91,7 @@ fn every_field_has_its_row() {
         emitters,
         guiding,
         adaptive,
+        outlier_rejection,
         mis,
         reused_subpaths,
         record_spacing,
@@ -107,7 +109,8 @@ fn every_field_has_its_row() {
     assert_eq!((node_padding, embree_robust, embree_build), (8.0, Switch::Off, EmbreeBuild::Low));
     assert_eq!((merge_radius, merge_pixels, merge_shrink), (0.5, 5.0, 1.0));
     assert_eq!((reused_subpaths, record_spacing), (50, 4));
-    assert_eq!((storing, guiding, adaptive, TABLE.len()), (0.5, AutoSwitch::Off, Switch::Off, 36));
+    assert_eq!((storing, guiding, adaptive, TABLE.len()), (0.5, AutoSwitch::Off, Switch::Off, 37));
+    assert_eq!(outlier_rejection, Switch::On);
     assert_eq!((axis_probability, emitters), (Some(2.5), AutoSwitch::On));
     assert_eq!((with.to_string(), without.to_string()), ("sds".into(), "caustics,lens".into()));
 }

@@ -119,7 +119,7 @@ pub unsafe extern "C" fn hrr_render(
         let done = render::render(scene, &settings, &watcher)?;
         // The end is told in any case, and its answer is of no use.
         let _ = lock(&watcher.progress).at(1.0);
-        let (image, stats) = (done.film.image(), &done.stats);
+        let (image, stats) = (done.image(), &done.stats);
         context.log.say(HRR_LOG_INFO, || {
             format!(
                 "{} iterations of {} in {:.3} s",

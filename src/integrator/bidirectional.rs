@@ -11,6 +11,7 @@ use crate::effects::Lobes;
 use crate::error::Result;
 use crate::film::Film;
 use crate::light_cache::LightCache;
+use crate::mis::EYE_HITS;
 use crate::roulette::Pregenerated;
 use crate::sampler::Stream;
 use crate::scene::Scene;
@@ -105,7 +106,7 @@ impl<'a> Bidirectional<'a> {
         let on = |switch: bool, m: f64| if switch { m } else { 0.0 };
         self.techniques = Techniques {
             heuristic: self.settings.mis,
-            eye_hits: on(recipe.eye_subpaths, 1.0),
+            eye_hits: on(recipe.eye_subpaths, EYE_HITS),
             next_event: on(recipe.next_event, 1.0),
             // Planned below, by what is planned here.
             emitters: None,

@@ -34,7 +34,7 @@ impl Bidirectional<'_> {
         };
         let mut parts = Parts::new(of);
         // How much the samples count for is known when all have been taken.
-        let apart = self.deadline.map(|_| Film::new(&self.world.scene.film));
+        let apart = self.deadline.map(|_| film.alike());
         let whole = apart.as_ref().unwrap_or(film);
         // Set aside, since the samples look at the rest of the machine.
         let mut adaptive = self.adaptive.take();

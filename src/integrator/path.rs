@@ -9,6 +9,7 @@ use crate::bsdf::Transport;
 use crate::error::Result;
 use crate::film::Film;
 use crate::math::Spectrum;
+use crate::mis::EYE_HITS;
 use crate::sampler::{Purpose, Sampler};
 use crate::settings::Settings;
 use crate::subpath::{Vertex, World};
@@ -37,21 +38,21 @@ impl<'a> PathTracer<'a> {
         let mut direction = world.camera.direction_from(origin, sample.raster);
         let mut ray = offset::from_free_point(origin, direction);
         let (mut sum, mut throughput) = (Spectrum::ZERO, Spectrum::ONE);
-        // Density of the last direction; `None` when next-event estimation could not have found what it hits.
+        // Density of the last direction, as it counts for weights; `None` when next-event estimation could not have found what it hits.
         let mut pdf_direction = None;
         for depth in 1..=self.settings.max_depth {
             let Some(point) = world.intersect(&ray, origin, direction) else {
                 if LIGHTS && let Some(sky) = world.lights.sky(direction) {
-                    let weight = pdf_direction.map_or(1.0, |pdf_w: f64| pdf_w / (pdf_w + sky.pdf));
+                    let weight = pdf_direction.map_or(1.0, |hits: f64| hits / (hits + sky.pdf));
                     sum += throughput * sky.radiance * weight;
                 }
                 break;
             };
             if let Some(emitter) = world.lights.at(&point) {
-                let weight = pdf_direction.map_or(1.0, |pdf_w: f64| {
+                let weight = pdf_direction.map_or(1.0, |hits: f64| {
                     let distance2 = (point.position - origin).length_squared();
                     let pdf_light = emitter.pdf_a * distance2 / point.ng.dot(direction).abs();
-                    pdf_w / (pdf_w + pdf_light)
+                    hits / (hits + pdf_light)
                 });
                 sum += throughput * emitter.radiance(-direction) * weight;
             }
@@ -78,7 +79,7 @@ impl<'a> PathTracer<'a> {
             }
             let Some((next_ray, s)) = next else { break };
             throughput *= s.weight;
-            pdf_direction = (!s.delta).then_some(s.pdf);
+            pdf_direction = (!s.delta).then_some(EYE_HITS * s.pdf);
             (ray, origin, direction) = (next_ray, point.position, s.wi);
         }
         sum
@@ -100,9 +101,9 @@ impl<'a> PathTracer<'a> {
         if scattered == Spectrum::ZERO {
             return None;
         }
-        // Over the sum of both densities; that of the emitter, seen from here, is pdf_a distance^2 / cos.
+        // Over the sum of both densities, as they count; that of the emitter, seen from here, is pdf_a distance^2 / cos.
         let cos = emitter.point.ng.dot(wi).abs();
-        let value = scattered * radiance * (cos / (emitter.pdf_a * distance2 + pdf_w * cos));
+        let value = scattered * radiance * (cos / (emitter.pdf_a * distance2 + EYE_HITS * pdf_w * cos));
         Some((value, offset::between(&vertex.point, &emitter.point)))
     }
 
@@ -113,8 +114,8 @@ impl<'a> PathTracer<'a> {
         let to = light.toward(vertex.point.position)?;
         let (scattered, pdf_w) = vertex.toward_light(to.w);
         // Scattering by chance meets surfaces and the sky only.
-        let pdf_w = if light.is_delta() { 0.0 } else { pdf_w };
-        let value = scattered * to.radiance * (to.cos / (light.pdf() * to.distance2 + pdf_w * to.cos));
+        let hits = if light.is_delta() { 0.0 } else { EYE_HITS * pdf_w };
+        let value = scattered * to.radiance * (to.cos / (light.pdf() * to.distance2 + hits * to.cos));
         (value != Spectrum::ZERO).then(|| (value, offset::to_light(&vertex.point, &light)))
     }
 }

@@ -12,6 +12,7 @@ pub use observer::{Observer, Progress, Silent};
 use crate::effects;
 use crate::error::{Error, Result};
 use crate::film::Film;
+use crate::image::Image;
 use crate::integrator::{self, Plan, Size};
 use crate::scene::Scene;
 use crate::settings::{Integrator, Settings, Switch};
@@ -36,6 +37,13 @@ pub struct Outcome {
     pub plan: Plan,
     /// Whether the observer ended it.
     pub interrupted: bool,
+}
+
+impl Outcome {
+    /// The image, without outliers where the settings say so.
+    pub fn image(&self) -> Image {
+        self.film.without_outliers().unwrap_or_else(|| self.film.image())
+    }
 }
 
 /// Renders a scene. The film depends on the scene, the settings' seed and the range of iterations only: not on
@@ -74,7 +82,8 @@ fn run(scene: &Scene, settings: &Settings, observer: &dyn Observer) -> Result<Ou
     if sizing.is_some() && settings.adaptive == Switch::On {
         integrator.adapt();
     }
-    let mut film = Film::new(&scene.film);
+    let rejects = settings.outlier_rejection == Switch::On;
+    let mut film = Film::watching(&scene.film, rejects);
     let mut tally = Tally::default();
     let mut bytes = (0, 0);
 
@@ -149,7 +158,7 @@ fn run(scene: &Scene, settings: &Settings, observer: &dyn Observer) -> Result<Ou
         iterations: finished,
         effects: effects.findings.iter().map(|f| (f.id.clone(), f.verdict.name().to_owned())).collect(),
         machinery: plan.machinery.iter().map(|&name| name.to_owned()).collect(),
-        biased: plan.is_biased(),
+        biased: plan.is_biased() || rejects,
         seconds: Seconds {
             load: 0.0,
             accel_build,

@@ -159,7 +159,7 @@ fn climb_by_time(scene: &Scene, settings: &Settings, seconds: f64) -> Result<Lad
         let (start, cpu_before) = (Instant::now(), processor_seconds());
         let outcome = by_time(scene, settings, first * f64::from(1u32 << rung), rung.into())?;
         let (seconds, s) = (start.elapsed().as_secs_f64(), outcome.stats.seconds);
-        ladder.images.push(outcome.film.image());
+        ladder.images.push(outcome.image());
         ladder.costs.push(Cost {
             iterations: outcome.stats.iterations,
             seconds,

@@ -78,6 +78,8 @@ pub struct Settings {
     pub guiding: AutoSwitch,
     /// Whether eye samples go to the pixels that need them, where the renderer chooses their number.
     pub adaptive: Switch,
+    /// Whether bright contributions that no others confirm count for less, which is biased.
+    pub outlier_rejection: Switch,
     /// How techniques that find the same path share its weight.
     pub mis: Heuristic,
     /// Light subpaths that probabilistic connections (`pcbpt`) choose from.
@@ -125,6 +127,7 @@ impl Default for Settings {
             emitters: AutoSwitch::Auto,
             guiding: AutoSwitch::Auto,
             adaptive: Switch::On,
+            outlier_rejection: Switch::Off,
             mis: Heuristic::Balance,
             reused_subpaths: 100,
             record_spacing: 8,

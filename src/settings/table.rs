@@ -292,6 +292,23 @@ pub const TABLE: &[Setting] = &[
               tenths of the time.",
     },
     Setting {
+        name: "outlier_rejection",
+        kind: Kind::Choice {
+            names: &Switch::NAMES,
+            planned: &[],
+            get: |s| s.outlier_rejection as usize,
+            set: |s, i| s.outlier_rejection = Switch::ALL[i],
+        },
+        default: "off",
+        value_name: "NAME",
+        heading: TRANSPORT,
+        help: "Whether bright samples that no others confirm count for less: biased",
+        doc: "on: the few largest contributions to each pixel are remembered, 48 bytes a pixel; what is over 4 times as \
+              bright as the fourth largest of the pixel and its neighbours, and over a tenth of the median pixel there, \
+              is cut to that. The image is biased and marked so, by less and less with time; 'hrr render' writes \
+              the plain one beside it.",
+    },
+    Setting {
         name: "mis",
         kind: Kind::Choice {
             names: &Heuristic::NAMES,

@@ -8,14 +8,14 @@ use clap::builder::ValueHint;
 use clap::{Arg, ArgAction, ArgMatches, value_parser};
 use hrr::effects;
 use hrr::file;
-use hrr::image::{self, Attributes, Format};
+use hrr::image::{self, Attributes, Format, Image};
 use hrr::integrator;
 use hrr::integrator::Size;
 use hrr::render::counters::{Stats, peak_rss_bytes};
 use hrr::render::noise::LEAST_HILL;
 use hrr::render::{ErrorEstimate, Noise, Outcome};
 use hrr::scene::Scene;
-use hrr::settings::Settings;
+use hrr::settings::{Settings, Switch};
 use hrr::{Error, Result};
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -130,6 +130,9 @@ pub fn run(args: &RenderArgs, log: &Log) -> Result<u8> {
     check_outputs(args)?;
 
     let (scene, settings) = args.scene.load(|warning| log.warning(warning))?;
+    if settings.outlier_rejection == Switch::On {
+        args.outputs.iter().try_for_each(|path| image::check_writable(&plain_beside(path)))?;
+    }
     let load = start.elapsed().as_secs_f64();
     announce(&scene, &settings, load, log);
 
@@ -146,18 +149,25 @@ pub fn run(args: &RenderArgs, log: &Log) -> Result<u8> {
         return Ok(INTERRUPTED);
     }
     stats.seconds.load = load;
-    let image = outcome.film.image();
+    let image = outcome.image();
+    let rejects = settings.outlier_rejection == Switch::On;
     let error = outcome.noise.error();
     let mut attributes = attributes(&scene, &settings, &outcome, &stats);
     if !outcome.sizes.is_empty() {
         attributes.set("hrr:sizes", sizes(&outcome.sizes));
     }
+    let write = |path: &Path, image: &Image, attributes: &Attributes| match Format::of(path)? {
+        Format::Exr => image::write(path, image, attributes),
+        Format::Png => image::write(path, &image.exposed(args.exposure), attributes),
+    };
     // One bad disk does not keep the image from the others.
-    let written = args.outputs.iter().map(|path| match Format::of(path)? {
-        Format::Exr => image::write(path, &image, &attributes),
-        Format::Png => image::write(path, &image.exposed(args.exposure), &attributes),
-    });
-    let written: Vec<Result<()>> = written.collect();
+    let mut written: Vec<Result<()>> =
+        args.outputs.iter().map(|path| write(path, &image, &attributes)).collect();
+    if rejects {
+        let plain = outcome.film.image();
+        attributes.set("hrr:biased", u64::from(outcome.plan.is_biased()));
+        written.extend(args.outputs.iter().map(|path| write(&plain_beside(path), &plain, &attributes)));
+    }
     let variance =
         args.variance.as_deref().map_or(Ok(()), |path| write_variance(path, &outcome.noise, &attributes));
     stats.memory.peak_rss_bytes = stats.memory.peak_rss_bytes.max(peak_rss_bytes());
@@ -170,6 +180,11 @@ pub fn run(args: &RenderArgs, log: &Log) -> Result<u8> {
         log.detail(format_args!("{:>20}  {}", "sizes", sizes(&outcome.sizes)));
     }
     summary(args, &stats, error, outcome.interrupted, log);
+    if rejects {
+        let plain: Vec<_> =
+            args.outputs.iter().map(|path| plain_beside(path).display().to_string()).collect();
+        log.info(format_args!("outliers are rejected, which is biased; with them: {}", plain.join(", ")));
+    }
     let missed = judge(&settings, error, &stats.integrator, log);
     Ok(match (outcome.interrupted, missed) {
         (true, _) => INTERRUPTED,
@@ -246,13 +261,19 @@ fn attributes(scene: &Scene, settings: &Settings, outcome: &Outcome, stats: &Sta
     let verdicts: Vec<_> = stats.effects.iter().map(|(id, verdict)| format!("{id}={verdict}")).collect();
     a.set("hrr:effects", verdicts.join(" "));
     a.set("hrr:machinery", plan.machinery.join(" "));
-    a.set("hrr:biased", u64::from(plan.is_biased()));
+    a.set("hrr:biased", u64::from(stats.biased));
     if let Some(error) = outcome.noise.error() {
         a.set("hrr:error", error.expected as f32);
         a.set("hrr:errorBound90", error.bound as f32);
         a.set("hrr:hillIndex", error.hill as f32);
     }
     a
+}
+
+/// Where the image with its outliers goes, beside the one without: `out.exr` -> `out.plain.exr`.
+fn plain_beside(path: &Path) -> PathBuf {
+    let extension = path.extension().unwrap_or_default().to_string_lossy();
+    path.with_extension(format!("plain.{extension}"))
 }
 
 fn write_variance(path: &Path, noise: &Noise, attributes: &Attributes) -> Result<()> {
