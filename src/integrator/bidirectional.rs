@@ -47,6 +47,8 @@ pub struct Bidirectional<'a> {
     pub(super) all: LightCache,
     /// Over `all`, for merging.
     pub(super) all_bvh: VertexBvh,
+    /// Numbers of the vertices to pick from, those near each other side by side; empty: as they lie.
+    pub(super) picks: Vec<u32>,
     pub(super) emitters: EmitterPoints,
     /// The roulette's numbers for `bvh`, where all queries share them.
     pub(super) numbers: Option<Pregenerated>,
@@ -74,6 +76,7 @@ impl<'a> Bidirectional<'a> {
             bvh: VertexBvh::new(),
             all: LightCache::default(),
             all_bvh: VertexBvh::new(),
+            picks: Vec::new(),
             emitters: EmitterPoints::default(),
             numbers: None,
             records: Records::default(),
@@ -187,6 +190,7 @@ impl Integrator for Bidirectional<'_> {
         }
         let on_light_side = |fraction| progress(LIGHT_SHARE * fraction);
         let mut tally = self.light_pass(Stream::Light, iteration, Some(film), &on_light_side);
+        self.order_picks();
         if self.recipe.roulette || self.recipe.merging {
             let build = Instant::now();
             self.build_trees(Stream::Light, iteration)?;
@@ -209,6 +213,7 @@ impl Integrator for Bidirectional<'_> {
         let (points, tree) = self.emitters.bytes();
         let caches = self.cache.bytes() + self.all.bytes() + self.records.bytes();
         let numbers = self.numbers.as_ref().map_or(0, Pregenerated::bytes);
-        (caches + points, self.bvh.bytes() + self.all_bvh.bytes() + numbers + tree)
+        let picks = self.picks.capacity() * size_of::<u32>();
+        (caches + picks + points, self.bvh.bytes() + self.all_bvh.bytes() + numbers + tree)
     }
 }

@@ -172,7 +172,9 @@ impl Bidirectional<'_> {
                     sum += self.connect_base(vertex, light, picks * tries, clock, tally);
                 }
             } else if stored > 0 {
-                let light = cache.load(self.world, ((u * stored as f64) as usize).min(stored - 1));
+                let place = ((u * stored as f64) as usize).min(stored - 1);
+                let index = self.picks.get(place).map_or(place, |&index| index as usize);
+                let light = cache.load(self.world, index);
                 let tries = picks * subpaths as f64 / stored as f64;
                 sum += self.connect_base(vertex, &light, tries, clock, tally);
             }

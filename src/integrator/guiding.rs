@@ -85,6 +85,12 @@ impl Bidirectional<'_> {
         Ok(())
     }
 
+    /// Squares of pixels that are looked at as a whole, across and down.
+    fn regions(&self) -> [u32; 2] {
+        let film = &self.world.scene.film;
+        [film.width, film.height].map(|side| side.div_ceil(REGION))
+    }
+
     /// Whether guiding gains more than it costs, as far as is known.
     fn does_guiding_pay(&self, observed: &[Observed]) -> bool {
         let found = observed.iter().flat_map(|o| &o.found).map(|(_, value)| value);
@@ -92,9 +98,8 @@ impl Bidirectional<'_> {
         if sum * sum < SPREAD * squares {
             return true;
         }
-        let film = &self.world.scene.film;
-        let regions = film.width.div_ceil(REGION) * film.height.div_ceil(REGION);
-        let mut regions = vec![PixelSums::default(); regions as usize];
+        let [across, down] = self.regions();
+        let mut regions = vec![PixelSums::default(); (across * down) as usize];
         for (region, seen) in observed.iter().flat_map(|o| &o.seen) {
             regions[*region as usize].add(seen, 1.0, 0.0);
         }
@@ -107,7 +112,7 @@ impl Bidirectional<'_> {
         let film = &self.world.scene.film;
         let sampler = Sampler::new(self.settings.seed, 0, Stream::GuideEye, index);
         let raster = sampler.u2(0, Purpose::Raster) * DVec2::new(film.width.into(), film.height.into());
-        let region = raster.y as u32 / REGION * film.width.div_ceil(REGION) + raster.x as u32 / REGION;
+        let region = raster.y as u32 / REGION * self.regions()[0] + raster.x as u32 / REGION;
         let sample = Sample { raster, index, sampler, plays: 1.0 };
         let seen = self.radiance_and(&sample, Clock::off(), &mut Tally::default(), &mut |light, value| {
             observed.found.push((light, luminance(value)));

@@ -2,6 +2,7 @@
 
 use super::bidirectional::Bidirectional;
 use super::recipe::Base;
+use super::tile::INSIDE;
 use crate::connect;
 use crate::error::Result;
 use crate::film::Film;
@@ -10,6 +11,8 @@ use crate::roulette::{MinimumRandom, Pregenerated};
 use crate::sampler::{Family, Purpose, Sampler, Stream};
 use crate::tally::Tally;
 use crate::vertex_bvh::VertexBvh;
+use glam::Vec3;
+use obvhs::ploc::morton::morton_encode_u64_unorm;
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Instant;
@@ -20,6 +23,8 @@ const CHUNK: u64 = 1024;
 const PILOT: u64 = 16 * CHUNK;
 /// Light subpaths whose vertices all are kept for uniform picks: enough for eye samples not to share many.
 const PICKED: u64 = 64 * CHUNK;
+/// Samples of a pixel from which on it pays to sort what they pick from.
+const SORTED: u32 = 4;
 impl Bidirectional<'_> {
     /// How many vertices a light subpath leaves in the roulette's cache, and in that of all.
     pub(super) fn vertices_per_subpath(&self) -> [f64; 2] {
@@ -59,6 +64,25 @@ impl Bidirectional<'_> {
         } else {
             (&self.cache, self.size.light_subpaths)
         }
+    }
+
+    /// Sorts the vertices to pick from along a curve through space, so that the picks of a pixel's samples, which are spread
+    /// evenly over them, are spread evenly over the surfaces.
+    pub(super) fn order_picks(&mut self) {
+        self.picks.clear();
+        if self.recipe.base != Base::Uniform || self.size.samples < SORTED {
+            return;
+        }
+        let positions = self.all().0.positions();
+        let low = positions.iter().copied().reduce(Vec3::min).unwrap_or_default();
+        let high = positions.iter().copied().reduce(Vec3::max).unwrap_or_default();
+        // A little under 1, which is no place on the curve.
+        let scale = (high - low).max(Vec3::splat(f32::MIN_POSITIVE)).recip().as_dvec3() * INSIDE;
+        let place = |p: &Vec3| morton_encode_u64_unorm((*p - low).as_dvec3() * scale);
+        let mut places: Vec<(u64, u32)> =
+            positions.par_iter().zip(0..positions.len() as u32).map(|(p, i)| (place(p), i)).collect();
+        places.par_sort_unstable();
+        self.picks.extend(places.iter().map(|&(_, index)| index));
     }
 
     /// Makes the trees over an iteration's light vertices, and the numbers that queries share.

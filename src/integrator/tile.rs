@@ -16,8 +16,10 @@ const SIDE: u32 = 16;
 /// Pixels of a tile, and what was seen there.
 type Watched = Vec<(u32, u32, PixelSums)>;
 
-/// One tile in this many has its shadow rays and queries timed.
+/// One pixel in this many has its shadow rays and queries timed.
 const TIMED: usize = 16;
+/// How far these are shifted from row to row, so that they lie everywhere.
+const SHIFT: u32 = 5;
 
 /// A little under 1: the film's size times this is inside it.
 pub(super) const INSIDE: f64 = 1.0 - 1e-12;
@@ -52,13 +54,13 @@ pub(super) fn sample_film(
         .into_par_iter()
         .map(|tile| {
             let (mut tally, mut watched) = (Tally::default(), Vec::new());
-            let clock = Clock::sampled(tile, TIMED.min(tiles));
             let (left, top) = (tile as u32 % across * SIDE, tile as u32 / across * SIDE);
             let mut seconds = 0.0;
             Clock::sampled(0, 1).time(&mut seconds, || {
                 for y in top..(top + SIDE).min(height) {
                     for x in left..(left + SIDE).min(width) {
                         let pixel = u64::from(y) * u64::from(width) + u64::from(x);
+                        let clock = clock_of(x, y);
                         let plan = plans
                             .map_or(PixelPlan { samples, share: 1.0 }, |plans| plans.pixel(x, y, samples));
                         let taken = part.range(plan.samples);
@@ -104,7 +106,28 @@ pub(super) fn sample_film(
     tally
 }
 
+/// The clock of a pixel.
+fn clock_of(x: u32, y: u32) -> Clock {
+    Clock::sampled((x + SHIFT * y) as usize, TIMED)
+}
+
 /// Where a pixel begins to count which of its samples play the roulette.
 fn pixel_offset(seed: u64, iteration: u64, pixel: u64) -> f64 {
     Sampler::new(seed, iteration, Stream::Pixel, pixel).u1(0, Purpose::Roulette)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// However small a mirror is, its queries are timed: what they cost decides how often they are asked.
+    #[test]
+    fn timed_pixels_lie_everywhere() {
+        let timed = |x: u32, y: u32| clock_of(x, y).count(1.0);
+        for (left, top) in (0..40).flat_map(|x| (0..40).map(move |y| (x, y))) {
+            let sum: f64 = (0..16).flat_map(|x| (0..16).map(move |y| timed(left + x, top + y))).sum();
+            assert_eq!(sum, 256.0);
+            assert!((0..6).any(|x| (0..6).any(|y| timed(left + x, top + y) > 0.0)), "{left} {top}");
+        }
+    }
 }

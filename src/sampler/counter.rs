@@ -81,7 +81,10 @@ impl Purpose {
     #[inline(always)]
     fn is_even(self) -> bool {
         use Purpose::*;
-        matches!(self, Raster | Lens | LightPick | LightPoint | LightDirection | Lobe | Direction | Survival)
+        matches!(
+            self,
+            Raster | Lens | LightPick | LightPoint | LightDirection | Lobe | Direction | Survival | CachePick
+        )
     }
 }
 
@@ -163,10 +166,13 @@ impl Sampler {
         }
     }
 
-    /// The `n`-th of any number of uniforms for a purpose.
+    /// The `n`-th of any number of uniforms for a purpose, each as [`Sampler::u1`] gives one.
     #[inline]
     pub fn nth(&self, depth: u32, purpose: Purpose, n: u32) -> f64 {
-        unit(combine(self.bits(depth, purpose), u64::from(n)))
+        match self.even(depth, purpose) {
+            Some((place, key)) => fraction(place.point1(combine(key, n.into()))),
+            None => unit(combine(self.bits(depth, purpose), u64::from(n))),
+        }
     }
 }
 
@@ -189,7 +195,7 @@ mod tests {
     #[test]
     fn families_are_spread_evenly_where_it_matters() {
         for (depth, purpose, even) in
-            [(1, Purpose::Direction, true), (1, Purpose::CachePick, false), (9, Purpose::Direction, false)]
+            [(1, Purpose::Direction, true), (1, Purpose::Storing, false), (9, Purpose::Direction, false)]
         {
             let hit = |family: u64| {
                 let mut seen = [false; 64];
