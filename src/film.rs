@@ -197,7 +197,9 @@ impl Film {
     /// Adds one contribution.
     fn add_one(&self, x: u32, y: u32, value: Spectrum) {
         let mut largest = Largest::default();
-        largest.add(value);
+        if self.outliers {
+            largest.add(value);
+        }
         self.add_pixel(x, y, value, &largest);
     }
 
@@ -266,6 +268,11 @@ impl Film {
         let pixels: Vec<Vec3> =
             (0..self.height).flat_map(|y| (0..self.width).map(move |x| self.mean(x, y).as_vec3())).collect();
         Image { width: self.width, height: self.height, pixels }
+    }
+
+    /// The image so far, without outliers where these are watched.
+    pub fn shown(&self) -> Image {
+        self.without_outliers().unwrap_or_else(|| self.image())
     }
 
     /// The image so far without outliers, which is biased; `None` where these were not watched.

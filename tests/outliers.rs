@@ -17,7 +17,7 @@ fn rejecting(integrator: Integrator, samples: u32, seed: u64) -> Settings {
 }
 
 fn mean(image: &Image) -> f64 {
-    image.pixels.iter().map(|p| luminance(p.as_dvec3().into())).sum::<f64>() / image.pixels.len() as f64
+    image.pixels.iter().map(|p| luminance(p.as_dvec3())).sum::<f64>() / image.pixels.len() as f64
 }
 
 /// Mean square difference of two images.

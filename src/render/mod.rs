@@ -42,7 +42,7 @@ pub struct Outcome {
 impl Outcome {
     /// The image, without outliers where the settings say so.
     pub fn image(&self) -> Image {
-        self.film.without_outliers().unwrap_or_else(|| self.film.image())
+        self.film.shown()
     }
 }
 

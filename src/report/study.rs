@@ -11,7 +11,7 @@ use crate::math::relative::{Tiles, floor, local_square, trimmed_mean};
 use crate::render::{self, counters::processor_seconds, noise::TRIMMED};
 use crate::sampler::counter::combine;
 use crate::scene::Scene;
-use crate::settings::{Integrator, Settings};
+use crate::settings::{Integrator, Settings, Switch};
 use crate::subpath::World;
 use glam::Vec3;
 use rayon::prelude::*;
@@ -177,7 +177,7 @@ fn climb(scene: &Scene, settings: &Settings, seconds: f64, longest: Option<u64>)
     let (start, cpu_before) = (Instant::now(), processor_seconds());
     let mut machine = integrator::new(&world, settings)?;
     let setup = start.elapsed().as_secs_f64();
-    let mut film = Film::new(&scene.film);
+    let mut film = Film::watching(&scene.film, settings.outlier_rejection == Switch::On);
     let mut ladder = Ladder { images: Vec::new(), costs: Vec::new() };
     let mut stages = [0.0; 5];
     let mut elapsed = setup;
@@ -195,7 +195,7 @@ fn climb(scene: &Scene, settings: &Settings, seconds: f64, longest: Option<u64>)
         stages.iter_mut().zip(more).for_each(|(s, m)| *s += m);
         let done = iteration + 1;
         if done.is_power_of_two() {
-            ladder.images.push(film.image());
+            ladder.images.push(film.shown());
             let cpu = processor_seconds().zip(cpu_before).map(|(now, before)| now - before);
             ladder.costs.push(Cost { iterations: done, seconds: elapsed, setup, cpu, stages });
             // The next rung takes as long as all so far.
