@@ -4,6 +4,7 @@ use crate::support::scenes;
 use glam::{DVec3, Vec3};
 use hrr::connect::EyeVertex;
 use hrr::film::Film;
+use hrr::integrator::Size;
 use hrr::math::{Frame, warp};
 use hrr::mis::Heuristic;
 use hrr::render::{Silent, render};
@@ -164,5 +165,25 @@ fn light_is_guided_where_that_pays() {
         });
         assert!(on != off, "{name}: it makes no difference");
         assert!(auto == if guided { on } else { off }, "{name}");
+    }
+}
+
+/// The pre-pass of a larger iteration has fewer light vertices than the iteration before it, and picks from its own.
+#[test]
+fn a_pre_pass_picks_from_its_own_light_vertices() {
+    let scene = scenes::load("cornell", &[("film.width", "64"), ("film.height", "48")]);
+    let settings = Settings {
+        integrator: Integrator::LvcHrr,
+        samples: 4,
+        light_subpaths: 1 << 12,
+        ..scene.settings.clone()
+    };
+    let world = World::new(&scene, &settings).unwrap();
+    let mut machine = hrr::integrator::new(&world, &settings).unwrap();
+    for light_subpaths in [1 << 17, 1 << 20] {
+        machine.resize(Size { samples: 4, light_subpaths }).unwrap();
+        if light_subpaths == 1 << 17 {
+            machine.iterate(0, &mut Film::new(&scene.film), &|_| ()).unwrap();
+        }
     }
 }

@@ -70,7 +70,6 @@ impl Bidirectional<'_> {
     /// Sorts the vertices to pick from along a curve through space, so that the picks of a pixel's samples, which are spread
     /// evenly over them, are spread evenly over the surfaces.
     pub(super) fn order_picks(&mut self) {
-        self.picks.clear();
         if self.recipe.base != Base::Uniform || self.size.samples < SORTED {
             return;
         }
@@ -182,6 +181,7 @@ impl Bidirectional<'_> {
             .collect();
         self.cache.clear();
         self.all.clear();
+        self.picks.clear();
         let mut tally = Tally::default();
         for ([cache, all], part_tally) in &parts {
             self.cache.append(cache);
