@@ -217,7 +217,8 @@ impl Film {
         }
     }
 
-    /// Adds another film of the same size, as if its samples had been taken here.
+    /// Adds another film of the same size, as if its samples had been taken here. Outliers are told among those that were
+    /// watched.
     pub fn merge(&mut self, other: &Film) -> Result<()> {
         if (self.width, self.height) != (other.width, other.height) {
             return Err(Error::Input(format!(
@@ -284,8 +285,9 @@ impl Film {
         let largest: Vec<Largest> = self.rows.iter().flat_map(|row| lock(row).largest.clone()).collect();
         let excess = outliers::excess(self.width as usize, &sums, &largest);
         let weights = self.weights.max(1) as f64;
-        let pixels =
-            sums.iter().zip(excess).map(|(&sum, excess)| ((sum - excess) * (1.0 / weights)).as_vec3());
+        // Sums end at 9e18, their largest contributions do not.
+        let rest = |(&sum, excess): (&Spectrum, Spectrum)| (sum - excess).max(Spectrum::ZERO);
+        let pixels = sums.iter().zip(excess).map(|pair| (rest(pair) * (1.0 / weights)).as_vec3());
         Some(Image { width: self.width, height: self.height, pixels: pixels.collect() })
     }
 }
@@ -346,6 +348,14 @@ mod tests {
         film.add_scaled(&other, 0.25);
         film.count_samples(1);
         assert_eq!(film.mean(1, 1), Spectrum::splat(3.0));
+    }
+
+    #[test]
+    fn no_outlier_makes_a_pixel_negative() {
+        let film = Film::watching(&FilmSettings { width: 3, height: 3, filter: Filter::Box }, true);
+        film.add(DVec2::ONE, Spectrum::new(1e300, 1e25, 0.0));
+        film.add(DVec2::ONE, Spectrum::ONE);
+        assert!(film.shown().pixels.iter().all(|p| p.min_element() >= 0.0), "{:?}", film.shown());
     }
 
     #[test]

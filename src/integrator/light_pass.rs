@@ -6,6 +6,7 @@ use crate::connect;
 use crate::error::Result;
 use crate::film::Film;
 use crate::light_cache::LightCache;
+use crate::math::Aabb;
 use crate::roulette::{MinimumRandom, Pregenerated};
 use crate::sampler::{Family, Purpose, Sampler, Stream};
 use crate::tally::Tally;
@@ -74,12 +75,11 @@ impl Bidirectional<'_> {
             return;
         }
         let positions = self.all().0.positions();
-        let low = positions.iter().copied().reduce(Vec3::min).unwrap_or_default();
-        let high = positions.iter().copied().reduce(Vec3::max).unwrap_or_default();
-        let scale = f32::from(CURVE) / (high - low).max(Vec3::splat(1e-30));
+        let bounds = Aabb::around(positions.iter().copied());
+        let scale = f32::from(CURVE) / (bounds.max - bounds.min).max(Vec3::splat(1e-30));
         // The number below its place on the curve: one word sorts faster than two.
         let word = |(p, index): (&Vec3, u32)| {
-            let [x, y, z] = ((*p - low) * scale).to_array().map(|v| (v as u16).min(CURVE - 1));
+            let [x, y, z] = ((*p - bounds.min) * scale).to_array().map(|v| (v as u16).min(CURVE - 1));
             u64::from(morton_encode_u32(x, y, z)) << 32 | u64::from(index)
         };
         let mut words: Vec<u64> = positions.par_iter().zip(0..positions.len() as u32).map(word).collect();
