@@ -8,7 +8,7 @@ use crate::mis::{Side, per_area};
 use crate::sampler::{Purpose, Sampler};
 use crate::subpath::walk::{Rules, Segment, Start, Walk};
 use crate::subpath::{Origin, Total, World};
-use crate::techniques::{Lobes, Merging, Techniques};
+use crate::techniques::{Lobes, Techniques};
 use crate::visibility::{Ray, offset};
 use glam::{DVec2, DVec3};
 
@@ -23,6 +23,8 @@ pub struct EyeVertex {
     m_previous: Total,
     /// m of that edge, were this vertex on an emitter.
     m_emitter: f64,
+    /// Whether the camera sees it by way of delta lobes alone, or directly.
+    shown: bool,
 }
 
 /// Where an eye subpath goes on to.
@@ -65,15 +67,15 @@ impl EyeVertex {
         let rules = techniques.rules(Transport::Radiance);
         let seen = Total { seen: techniques.light_image, ..Total::default() };
         match Walk::arrive(world, &rules, &start, Spectrum::ONE, point) {
-            Some(walk) => Onward::Vertex(Self::new(techniques, walk, seen, 0.0)),
+            Some(walk) => Onward::Vertex(Self::new(techniques, walk, seen, 0.0, true)),
             None => Onward::End,
         }
     }
 
-    fn new(techniques: &Techniques, walk: Walk, m_previous: Total, m_emitter: f64) -> Self {
+    fn new(techniques: &Techniques, walk: Walk, m_previous: Total, m_emitter: f64, shown: bool) -> Self {
         let delta = walk.vertex.bsdf.is_delta();
         let lobes = if delta { Lobes::NONE } else { techniques.lobes(&walk.vertex, walk.vertex.wo) };
-        Self { walk, lobes, m_previous: if delta { Total::default() } else { m_previous }, m_emitter }
+        Self { walk, lobes, m_previous: if delta { Total::default() } else { m_previous }, m_emitter, shown }
     }
 
     /// Goes on from this vertex.
@@ -91,12 +93,13 @@ impl EyeVertex {
             return self.sky(world, techniques, &rules, &segment);
         };
         let Some(walk) = self.walk.go_on(world, &rules, &segment, point) else { return Onward::End };
+        let shown = self.shown && walk.after_delta;
         if walk.after_delta {
-            return Onward::Vertex(Self::new(techniques, walk, Total::default(), 0.0));
+            return Onward::Vertex(Self::new(techniques, walk, Total::default(), 0.0, shown));
         }
         let back = -walk.to_previous();
         let m = techniques.connection(&self.lobes, back);
-        Onward::Vertex(Self::new(techniques, walk, m, techniques.direct(&self.lobes, Some(back))))
+        Onward::Vertex(Self::new(techniques, walk, m, techniques.direct(&self.lobes, Some(back)), shown))
     }
 
     /// What a segment that leaves the scene finds.
@@ -135,7 +138,8 @@ impl EyeVertex {
         Total {
             known: heuristic.total(side, m.known, back, 0.0),
             stored: heuristic.total(side, m.stored, 0.0, 0.0),
-            seen: heuristic.total(side, m.seen, 0.0, techniques.eta()),
+            seen: heuristic.total(side, m.seen, 0.0, 0.0),
+            merged: heuristic.raise(self.eta(techniques)),
         }
     }
 
@@ -247,16 +251,21 @@ impl EyeVertex {
         Some((value, offset::between(&eye.point, &y.point)))
     }
 
+    /// eta here; 0 where light vertices are not merged.
+    pub fn eta(&self, techniques: &Techniques) -> f64 {
+        let all = !techniques.storing.shown_only;
+        if all || self.shown && self.walk.depth > 1 { techniques.eta() } else { 0.0 }
+    }
+
     /// Merging with a light vertex within the radius: the light that arrives there counts as arriving here.
-    pub fn merge(&self, techniques: &Techniques, merging: &Merging, light: &Walk) -> Spectrum {
+    pub fn merge(&self, techniques: &Techniques, light: &Walk) -> Spectrum {
         let vertex = &self.walk.vertex;
         let value = self.walk.throughput * vertex.factor(vertex.wo, light.vertex.wo) * light.throughput;
-        let merged = techniques.seen(light);
-        if value == Spectrum::ZERO || merged == 0.0 {
+        let eta = self.eta(techniques) * techniques.merged(light);
+        if value == Spectrum::ZERO || eta == 0.0 {
             return Spectrum::ZERO;
         }
-        let eta = merging.eta() * merged;
-        let light_total = techniques.light_total(light, vertex.wo);
+        let light_total = techniques.light_total(light, vertex.wo, eta);
         let eye_total = self.total(techniques, light.vertex.wo, light.origins[0]);
         value * (techniques.heuristic.merging_weight(light_total, eta, eye_total) / eta)
     }

@@ -259,9 +259,14 @@ impl Techniques {
         self.storing.probability(Role::Stored, light.origins[0])
     }
 
-    /// 1 or 0: whether the camera is connected to a light vertex, and eye vertices are merged with it.
+    /// 1 or 0: whether the camera is connected to a light vertex.
     pub fn seen(&self, light: &Walk) -> f64 {
         self.storing.probability(Role::Seen, light.origins[0])
+    }
+
+    /// 1 or 0: whether eye vertices are merged with a light vertex.
+    pub fn merged(&self, light: &Walk) -> f64 {
+        self.storing.probability(Role::Merged, light.origins[0])
     }
 
     /// m of the edge that leads to the light vertex's predecessor, were the light vertex an eye vertex seen from
@@ -308,21 +313,27 @@ impl Techniques {
         Rules { transport, heuristic: self.heuristic, storing: self.storing }
     }
 
-    /// eta at vertices that are not delta, where they are merged at all; 0 without merging.
+    /// eta at eye vertices that light vertices are merged with; 0 without merging.
     pub fn eta(&self) -> f64 {
         self.merging.map_or(0.0, |merging| merging.eta())
+    }
+
+    /// eta at a light vertex from which the path goes on to another that is not delta, or to the camera.
+    pub fn eta_of_light(&self, light: &Walk) -> f64 {
+        // What smooth surfaces show to the camera, no other technique than merging finds from there.
+        if self.storing.shown_only { 0.0 } else { self.merged(light) * self.eta() }
     }
 
     /// L_s of a technique whose eye side ends with an edge along `w_eye` at the light vertex; `density`: in which the
     /// eye side would choose that vertex.
     pub(crate) fn light_others(&self, light: &Walk, density: f64, w_eye: DVec3) -> f64 {
-        self.heuristic.others(density, self.light_total(light, w_eye))
+        self.heuristic.others(density, self.light_total(light, w_eye, self.eta_of_light(light)))
     }
 
-    /// The sum over the light side's techniques up to a light vertex from which the path goes on along `w_eye`.
-    pub fn light_total(&self, light: &Walk, w_eye: DVec3) -> f64 {
+    /// The sum over the light side's techniques up to a light vertex from which the path goes on along `w_eye`; `merging`: eta
+    /// there.
+    pub fn light_total(&self, light: &Walk, w_eye: DVec3, merging: f64) -> f64 {
         let back = light.vertex.pdf_w(w_eye, light.vertex.wo);
-        let merging = self.seen(light) * self.eta();
         self.heuristic.total(&light.side, self.before(light, w_eye), back, merging)
     }
 
@@ -332,7 +343,7 @@ impl Techniques {
             if s.delta {
                 return Total::known(self.heuristic.total(&light.side, 0.0, s.pdf_rev, 0.0));
             }
-            let merging = self.seen(light) * self.eta();
+            let merging = self.eta_of_light(light);
             Total::known(self.heuristic.total(&light.side, self.before(light, s.wi), s.pdf_rev, merging))
         })
     }

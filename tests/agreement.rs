@@ -139,7 +139,9 @@ fn vertex_merging_agrees_on_every_material() {
     let scene = scenes::box_of_everything();
     let pt = run(&scene, Integrator::Pt, 1, 64, 16);
     for (seed, integrator) in
-        [Integrator::Vcm, Integrator::VcmHrr, Integrator::PcvcmHrr].into_iter().enumerate()
+        [Integrator::Vcm, Integrator::VcmHrr, Integrator::PcvcmHrr, Integrator::LvcHrrSds]
+            .into_iter()
+            .enumerate()
     {
         let settings = Settings {
             integrator,

@@ -165,18 +165,18 @@ fn every_effect_is_found_where_it_is_and_nowhere_else() {
 fn the_plan_is_the_least_that_finds_the_light() {
     for (scene, integrator) in [
         (plain(), Integrator::Pt),
-        (with_cube(mirror()), Integrator::Lvc),
+        (with_cube(mirror()), Integrator::LvcSds),
         (with_cube(metal(1e-3, 1e-3)), Integrator::LvcHrr),
         (with_cube(metal(1e-6, 1e-6)), Integrator::LvcHrr),
         // As good as diffuse.
         (with_cube(metal(0.5, 0.5)), Integrator::Pt),
-        (lit(with_cube(mirror()), lamp_without_size()), Integrator::Vcm),
+        (lit(with_cube(mirror()), lamp_without_size()), Integrator::LvcSds),
         (lit(with_cube(metal(1e-3, 1e-3)), lamp_without_size()), Integrator::LvcHrr),
     ] {
         assert_eq!(planned(&scene, &settings()).unwrap().integrator, integrator);
     }
     let asked = |list: &str| Settings { with: list.parse().unwrap(), ..settings() };
-    assert_eq!(planned(&plain(), &asked("sds")).unwrap().integrator, Integrator::Vcm);
+    assert_eq!(planned(&plain(), &asked("sds")).unwrap().integrator, Integrator::LvcSds);
     assert_eq!(planned(&plain(), &asked("sdg")).unwrap().integrator, Integrator::LvcHrr);
     assert_eq!(planned(&plain(), &asked("caustics")).unwrap().integrator, Integrator::Lvc);
 }

@@ -36,7 +36,7 @@ const TECHNIQUES: Techniques = Techniques {
         numerics: Numerics::DEFAULT,
     }),
     merging: Some(Merging { light_subpaths: 1400.0, radius: 0.01 }),
-    storing: Storing { share: 0.3, max_alpha: 0.22, lamps: false },
+    storing: Storing { share: 0.3, max_alpha: 0.22, lamps: false, shown_only: false },
     guide: None,
 };
 
@@ -132,6 +132,7 @@ impl Path {
             match (role, origin) {
                 (_, Origin::Lamp) if !t.storing.lamps => 0.0,
                 (Role::Stored, Origin::Lamp | Origin::Broad) => t.storing.share,
+                (Role::Merged, Origin::Lamp | Origin::Broad) if t.storing.shown_only => 0.0,
                 _ => 1.0,
             }
         };
@@ -155,8 +156,11 @@ impl Path {
         };
         let b = |s: usize| (0..s).map(fw).product::<f64>() * (s..k - 1).map(rv).product::<f64>();
         let eta = t.merging.map_or(0.0, |m| m.light_subpaths * std::f64::consts::PI * m.radius * m.radius);
-        let merging = |i: usize| {
-            if i == 0 || i > k - 2 || delta(i) { 0.0 } else { has(Role::Seen, i) * eta * b(i) * fw(i) }
+        // Only delta surfaces, one at least, between the vertex and the camera.
+        let shown = |i: usize| i < k - 2 && (i + 1..=k - 2).all(delta);
+        let merging = |i: usize| match i == 0 || i > k - 2 || delta(i) || t.storing.shown_only && !shown(i) {
+            true => 0.0,
+            false => has(Role::Merged, i) * eta * b(i) * fw(i),
         };
         [(0..k).map(|s| m(s) * b(s)).collect(), (0..k).map(merging).collect()]
     }
@@ -215,7 +219,7 @@ fn led_to(world: &World<'_>, t: &Techniques, light: &Walk, end: &Vertex) -> Opti
         direction,
         pdf_w,
         cos: y.cos_ng(direction),
-        total: Total::known(t.light_total(light, direction)),
+        total: Total::known(t.light_total(light, direction, t.eta_of_light(light))),
         distant: false,
     };
     let throughput = light.throughput * y.factor(direction, y.wo) * (start.cos / pdf_w);
@@ -286,8 +290,8 @@ fn check_guided(scene: &Scene, heuristic: Heuristic) {
     let guide = EmissionGuide::learn(&world.lights, observations).map(Arc::new);
     assert!(guide.is_some());
     for guide in [None, guide] {
-        for lamps in [false, true] {
-            let storing = Storing { lamps, ..TECHNIQUES.storing };
+        for (lamps, shown_only) in [(false, false), (true, false), (false, true)] {
+            let storing = Storing { lamps, shown_only, ..TECHNIQUES.storing };
             check(&world, &Techniques { heuristic, guide: guide.clone(), storing, ..TECHNIQUES });
         }
     }
@@ -296,7 +300,9 @@ fn check_guided(scene: &Scene, heuristic: Heuristic) {
 fn check(world: &World<'_>, t: &Techniques) {
     let mut checked = [0usize; 7];
     let mut with_delta = 0;
-    for index in 0..16_000u64 {
+    // Few are merged that smooth surfaces show.
+    let paths: u64 = if t.storing.shown_only { 80_000 } else { 16_000 };
+    for index in 0..paths {
         let eye_sampler = Sampler::new(1, 0, Stream::Eye, index);
         let light_sampler = Sampler::new(1, 0, Stream::Light, index);
         let lights = light_walks(world, t, &light_sampler, (index % 5) as usize);
@@ -404,11 +410,12 @@ fn check(world: &World<'_>, t: &Techniques) {
             // Merging where the eye walk ends, with a light walk that is led there.
             let path = path(start, &lights, &eyes);
             let (y, z) = (&light.vertex, &eye.walk.vertex);
-            let merging = t.merging.as_ref().unwrap();
-            let value = eye.merge(t, merging, &light);
-            let tries = merging.eta() * t.seen(&light);
+            let value = eye.merge(t, &light);
+            let tries = eye.eta(t) * t.merged(&light);
             let plain = eye.walk.throughput * z.factor(z.wo, y.wo) * light.throughput / tries;
-            if plain.x > 0.0 && tries > 0.0 {
+            if tries == 0.0 {
+                assert_eq!(value, Spectrum::ZERO);
+            } else if plain.x > 0.0 {
                 close("merging", value.x / plain.x, path.weight(world, t, 1, lights.len() + 1));
                 count(4, &path);
             }

@@ -203,17 +203,16 @@ impl<'a> Facts<'a> {
                 reason(of(has(effect)), "glossy surfaces show others", why)
             }
             Effect::Sds => {
-                let all: Vec<_> = classes.iter().filter(|c| c.effect == effect).collect();
-                match all.iter().any(|c| self.only_merging(c)) {
-                    true => (
-                        Verdict::Wanted,
-                        format!("only merging finds {}", all.last().map_or(String::new(), |c| c.to_string())),
-                    ),
-                    false if !all.is_empty() => {
-                        let why = "L S D S E: eye subpaths that meet the light by chance find it; merging would find it sooner";
-                        (Verdict::Inert, why.to_owned())
+                // Lights without size come last.
+                match classes.iter().rfind(|c| c.effect == effect) {
+                    Some(class) if class.delta_light => {
+                        (Verdict::Wanted, format!("only merging finds {class}"))
                     }
-                    false => reason(Verdict::Absent, "", "no smooth surface before and after a diffuse one"),
+                    Some(class) => (
+                        Verdict::Wanted,
+                        format!("but for merging, only chance that meets a light finds {class}"),
+                    ),
+                    None => (Verdict::Absent, "no smooth surface before and after a diffuse one".into()),
                 }
             }
             Effect::Specular => (of(self.any(|l| l.specular)), "smooth lobes".into()),
@@ -253,16 +252,8 @@ impl<'a> Facts<'a> {
     }
 
     fn reads_light_subpaths(&self, classes: &[PathClass]) -> bool {
-        let reads = |c: &PathClass| {
-            matches!(c.effect, Effect::Caustics | Effect::Sdg)
-                || c.effect == Effect::Sds && self.only_merging(c)
-        };
+        let reads = |c: &PathClass| matches!(c.effect, Effect::Caustics | Effect::Sdg | Effect::Sds);
         classes.iter().any(reads)
-    }
-
-    /// Whether nothing but merging finds caustics that smooth surfaces show: no eye subpath meets a light without size.
-    fn only_merging(&self, sds: &PathClass) -> bool {
-        self.judge.holds(Predicate::OnlyMerging, sds.delta_light)
     }
 
     fn maps(&self, effect: Effect) -> (Verdict, String) {

@@ -39,6 +39,8 @@ pub struct Coverage {
     pub connections: bool,
     /// Light vertices near an eye vertex count as if they were it.
     pub merging: bool,
+    /// The same of caustics, where perfectly smooth surfaces show them to the camera.
+    pub merging_shown: bool,
 }
 
 impl Coverage {
@@ -53,6 +55,10 @@ impl Coverage {
             || self.light_image && surfaces.last().is_some_and(open)
             || self.connections && surfaces.windows(2).any(|pair| pair.iter().all(open))
             || self.merging && surfaces.iter().any(open)
+            || self.merging_shown
+                && surfaces.iter().rposition(open).is_some_and(|first| {
+                    first + 1 < surfaces.len() && first > 0 && surfaces[first - 1] != Vertex::D
+                })
     }
 }
 
@@ -82,9 +88,10 @@ mod tests {
             light_image: name == "image",
             connections: name == "connect",
             merging: name == "merge",
+            merging_shown: name == "shown",
         };
         let found = |class: &PathClass| {
-            ["eye", "next", "image", "connect", "merge"]
+            ["eye", "next", "image", "connect", "merge", "shown"]
                 .into_iter()
                 .filter(|name| only(name).finds(class))
                 .collect::<Vec<_>>()
@@ -94,8 +101,9 @@ mod tests {
         assert_eq!(found(&class(false, &[S, D])), "eye image merge");
         assert_eq!(found(&class(true, &[S, D])), "image merge");
         assert_eq!(found(&class(true, &[S, D, G])), "image connect merge");
-        assert_eq!(found(&class(true, &[S, D, S])), "merge");
-        assert_eq!(found(&class(false, &[S, D, S])), "eye merge");
+        assert_eq!(found(&class(true, &[S, D, S])), "merge shown");
+        assert_eq!(found(&class(true, &[S, D, D, S])), "connect merge");
+        assert_eq!(found(&class(false, &[S, D, S])), "eye merge shown");
         assert_eq!(found(&class(true, &[S])), "");
         assert_eq!(class(true, &[S, D, S]).to_string(), "L S D S E (from a light without size)");
     }

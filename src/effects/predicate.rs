@@ -64,8 +64,6 @@ predicates! {
     Convex,
     /// All of the mesh is in one plane.
     Flat,
-    /// Only merging finds the caustics that smooth surfaces show.
-    OnlyMerging,
 }
 
 /// Answers to predicates: those that the scene gives, but for at most one.

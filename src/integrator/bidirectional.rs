@@ -4,7 +4,7 @@ use super::adaptive::Adaptive;
 use super::balance::Costs;
 use super::emitters::EmitterPoints;
 use super::merging;
-use super::recipe::{Base, Recipe};
+use super::recipe::{Base, Merge, Recipe};
 use super::records::Records;
 use super::{Integrator, Size};
 use crate::effects::Lobes;
@@ -71,7 +71,7 @@ impl<'a> Bidirectional<'a> {
             size: Size { samples: 0, light_subpaths: 0 },
             guided_by: 0,
             guiding_pays: true,
-            first_radius: if recipe.merging { merging::first_radius(world, settings) } else { 0.0 },
+            first_radius: if recipe.merges() { merging::first_radius(world, settings) } else { 0.0 },
             cache: LightCache::default(),
             bvh: VertexBvh::new(),
             all: LightCache::default(),
@@ -90,7 +90,7 @@ impl<'a> Bidirectional<'a> {
     /// Whether light subpaths follow what a pre-pass found useful, if that says that it pays. What merging finds is on all surfaces, and noisier where
     /// fewer of them go.
     fn is_guided(&self) -> bool {
-        self.recipe.roulette && self.settings.guiding.is_on(|| !self.recipe.merging)
+        self.recipe.roulette && self.settings.guiding.is_on(|| self.recipe.merge != Merge::All)
     }
 
     /// Sets how often each technique tries, per eye sample.
@@ -99,6 +99,7 @@ impl<'a> Bidirectional<'a> {
             share: if self.recipe.roulette { self.settings.storing } else { 1.0 },
             max_alpha: self.settings.hrr_alpha,
             lamps: !self.recipe.next_event,
+            shown_only: self.recipe.merge == Merge::Shown,
         };
         let (recipe, n_l) = (&self.recipe, self.size.light_subpaths as f64);
         let (eye_samples, area) = (f64::from(self.size.samples), self.world.scene.mesh.total_area());
@@ -181,9 +182,12 @@ impl Integrator for Bidirectional<'_> {
 
     fn iterate(&mut self, iteration: u64, film: &mut Film, progress: &(dyn Fn(f64) + Sync)) -> Result<Tally> {
         let start = Instant::now();
+        // The discs around the samples of a pixel, together, are what one around its only sample would be.
+        let samples = if self.recipe.merge == Merge::Shown { self.size.samples } else { 1 };
+        let radius = merging::radius(self.first_radius, self.settings.merge_shrink, iteration);
         self.techniques.merging = (self.first_radius > 0.0).then(|| Merging {
             light_subpaths: self.size.light_subpaths as f64,
-            radius: merging::radius(self.first_radius, self.settings.merge_shrink, iteration),
+            radius: radius / f64::from(samples).sqrt(),
         });
         if let Some(adaptive) = &mut self.adaptive {
             adaptive.begin(&self.world.scene.film, self.size);
@@ -191,7 +195,7 @@ impl Integrator for Bidirectional<'_> {
         let on_light_side = |fraction| progress(LIGHT_SHARE * fraction);
         let mut tally = self.light_pass(Stream::Light, iteration, Some(film), &on_light_side);
         self.order_picks();
-        if self.recipe.roulette || self.recipe.merging {
+        if self.recipe.roulette || self.recipe.merges() {
             let build = Instant::now();
             self.build_trees(Stream::Light, iteration)?;
             tally.vertex_bvh_build += build.elapsed().as_secs_f64();

@@ -201,13 +201,16 @@ impl Bidirectional<'_> {
     /// Merging with all light vertices within the radius.
     fn merge(&self, vertex: &EyeVertex, tally: &mut Tally) -> Spectrum {
         let Some(merging) = &self.techniques.merging else { return Spectrum::ZERO };
+        if vertex.eta(&self.techniques) == 0.0 {
+            return Spectrum::ZERO;
+        }
         let (depth, position) = (vertex.walk.depth, vertex.walk.vertex.point.position);
         let mut sum = Spectrum::ZERO;
-        let (cache, _) = self.all();
-        self.all_bvh().within(position, merging.radius, &mut |index| {
+        let (cache, tree) = self.merged();
+        tree.within(position, merging.radius, &mut |index| {
             if depth + cache.depth(index as usize) <= self.settings.max_depth {
                 let light = cache.load(self.world, index as usize);
-                sum += vertex.merge(&self.techniques, merging, &light);
+                sum += vertex.merge(&self.techniques, &light);
                 tally.merged += 1;
             }
         });

@@ -1,7 +1,7 @@
 //! The light pass: light subpaths, the caches that they fill, and what of them the camera sees.
 
 use super::bidirectional::Bidirectional;
-use super::recipe::Base;
+use super::recipe::{Base, Merge};
 use crate::connect;
 use crate::error::Result;
 use crate::film::Film;
@@ -42,7 +42,7 @@ impl Bidirectional<'_> {
     }
 
     fn keeps_vertices(&self) -> bool {
-        self.recipe.base != Base::Off || self.recipe.roulette || self.recipe.merging
+        self.recipe.base != Base::Off || self.recipe.roulette || self.recipe.merges()
     }
 
     /// Whether picks and merging have a cache of their own, since the roulette leaves out most of what they want.
@@ -52,14 +52,24 @@ impl Bidirectional<'_> {
 
     /// Subpaths of which that cache has the vertices.
     fn kept_apart(&self) -> u64 {
-        match (self.all_apart(), self.recipe.merging) {
+        match (self.all_apart(), self.recipe.merge) {
             (false, _) => 0,
-            (true, true) => self.size.light_subpaths,
-            (true, false) => self.size.light_subpaths.min(PICKED),
+            (true, Merge::All) => self.size.light_subpaths,
+            (true, _) => self.size.light_subpaths.min(PICKED),
         }
     }
 
-    /// The light vertices to pick from where the roulette is off, and to merge with; and how many subpaths left them.
+    /// Whether light vertices to merge with lie apart from the roulette's, which has all caustics, but little else.
+    fn merged_apart(&self) -> bool {
+        self.recipe.merge == Merge::All && self.all_apart()
+    }
+
+    /// The light vertices to merge with.
+    pub(super) fn merged(&self) -> (&LightCache, &VertexBvh) {
+        if self.merged_apart() { (&self.all, &self.all_bvh) } else { (&self.cache, &self.bvh) }
+    }
+
+    /// The light vertices to pick from where the roulette is off; and how many subpaths left them.
     pub(super) fn all(&self) -> (&LightCache, u64) {
         if self.all_apart() {
             (&self.all, self.kept_apart())
@@ -90,7 +100,7 @@ impl Bidirectional<'_> {
     /// Makes the trees over an iteration's light vertices, and the numbers that queries share.
     pub(super) fn build_trees(&mut self, stream: Stream, iteration: u64) -> Result<()> {
         self.bvh.build(self.cache.positions())?;
-        if self.recipe.merging && self.all_apart() {
+        if self.merged_apart() {
             self.all_bvh.build(self.all.positions())?;
         }
         let shared = self.recipe.roulette && MinimumRandom::of(self.settings.minimum).is_none();
@@ -99,11 +109,6 @@ impl Bidirectional<'_> {
             Pregenerated::new(&self.bvh, sampler.bits(0, Purpose::Roulette))
         });
         Ok(())
-    }
-
-    /// The tree over the vertices to merge with.
-    pub(super) fn all_bvh(&self) -> &VertexBvh {
-        if self.all_apart() { &self.all_bvh } else { &self.bvh }
     }
 
     /// Traces light subpaths, storing their vertices and connecting them to the camera. Gives the roulette's cache and
@@ -117,7 +122,7 @@ impl Bidirectional<'_> {
     ) -> ([LightCache; 2], Tally) {
         let (world, start) = (self.world, Instant::now());
         // A path has one segment more when it is connected than when it is merged.
-        let more = if self.recipe.merging { 1 } else { 2 };
+        let more = if self.recipe.merges() { 1 } else { 2 };
         let mut tally = Tally { light_subpaths: subpaths.end - subpaths.start, ..Tally::default() };
         let (thin, kept_apart) = (self.recipe.roulette, self.kept_apart());
         let [mut cache, mut all] = [(); 2].map(|()| LightCache::default());

@@ -20,7 +20,7 @@ mod watched;
 
 pub use balance::Costs;
 pub use plan::Plan;
-pub use recipe::Recipe;
+pub use recipe::{Merge, Recipe};
 
 use crate::error::Result;
 use crate::film::{Film, FilmSettings};

@@ -1,6 +1,6 @@
 //! `auto`: the least machinery that covers what a scene calls for.
 
-use super::recipe::{Base, Recipe};
+use super::recipe::{Base, Merge, Recipe};
 use crate::effects::paths::{Coverage, Vertex};
 use crate::effects::{Effect, EffectSet, Effects, PathClass};
 use crate::error::{Error, Place, Result};
@@ -55,8 +55,8 @@ pub fn plan(scene: &Scene, settings: &Settings, effects: &Effects) -> Result<Pla
         settings.integrator
     } else {
         match (on(Effect::Sds) && light_subpaths, on(Effect::Sdg) && light_subpaths) {
-            (true, true) => Integrator::VcmHrr,
-            (true, false) => Integrator::Vcm,
+            (true, true) => Integrator::LvcHrrSds,
+            (true, false) => Integrator::LvcSds,
             (false, true) => Integrator::LvcHrr,
             (false, false) if light_subpaths && (on(Effect::Caustics) || on(Effect::LightSubpaths)) => {
                 Integrator::Lvc
@@ -65,9 +65,11 @@ pub fn plan(scene: &Scene, settings: &Settings, effects: &Effects) -> Result<Pla
         }
     };
     let recipe = Recipe::of(integrator);
-    let dropped: EffectSet = settings.without.iter().filter(|&e| effects.wants(e)).collect();
     let uncovered: Vec<PathClass> =
         effects.classes.iter().filter(|class| !coverage(recipe.as_ref()).finds(class)).cloned().collect();
+    // Without merging, what meets lights by chance may find all that it would.
+    let lost = |e: Effect| e != Effect::Sds || uncovered.iter().any(|class| class.effect == e);
+    let dropped: EffectSet = settings.without.iter().filter(|&e| effects.wants(e) && lost(e)).collect();
     let left_out = |effect: Effect| settings.without.contains(effect);
     let tolerated = |class: &PathClass| {
         let smooth = class.surfaces.contains(&Vertex::S);
@@ -97,7 +99,8 @@ fn coverage(recipe: Option<&Recipe>) -> Coverage {
         next_event: r.next_event,
         light_image: r.light_image,
         connections: r.base != Base::Off,
-        merging: r.merging,
+        merging: r.merge == Merge::All,
+        merging_shown: r.merge == Merge::Shown,
     })
 }
 
@@ -109,9 +112,9 @@ fn machinery(recipe: Option<&Recipe>) -> Vec<&'static str> {
         (r.next_event, "next_event"),
         (r.light_image, "light_image"),
         (r.base != Base::Off, "connections"),
-        (r.roulette || r.merging, "vertex_bvh"),
+        (r.roulette || r.merges(), "vertex_bvh"),
         (r.roulette, "hrr"),
-        (r.merging, "merging"),
+        (r.merges(), "merging"),
     ]
     .into_iter()
     .filter_map(|(on, name)| on.then_some(name))

@@ -15,6 +15,17 @@ pub enum Base {
     Probabilistic,
 }
 
+/// Which light vertices near an eye vertex count as if they were it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Merge {
+    /// None.
+    Off,
+    /// Those of caustics, at eye vertices that perfectly smooth surfaces show to the camera: what connections cannot find.
+    Shown,
+    /// All, at all eye vertices.
+    All,
+}
+
 /// What an algorithm switches on.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Recipe {
@@ -29,10 +40,15 @@ pub struct Recipe {
     /// Hierarchical Russian roulette over all light vertices at glossy eye vertices.
     pub roulette: bool,
     /// Light vertices near an eye vertex count as if they were it.
-    pub merging: bool,
+    pub merge: Merge,
 }
 
 impl Recipe {
+    /// Whether any light vertices are merged with eye vertices, so that the image is blurred, by less and less.
+    pub fn merges(&self) -> bool {
+        self.merge != Merge::Off
+    }
+
     /// The switches of an integrator; `None` for path tracing, which is code of its own. `Auto` means `lvc+hrr`.
     pub fn of(integrator: Integrator) -> Option<Self> {
         let all = Self {
@@ -41,7 +57,7 @@ impl Recipe {
             light_image: true,
             base: Base::Uniform,
             roulette: false,
-            merging: false,
+            merge: Merge::Off,
         };
         match integrator {
             Integrator::Pt => None,
@@ -49,13 +65,15 @@ impl Recipe {
             Integrator::Bpt => Some(Self { base: Base::OwnPath, ..all }),
             Integrator::Lvc => Some(all),
             Integrator::LvcHrr | Integrator::Auto => Some(Self { roulette: true, ..all }),
+            Integrator::LvcSds => Some(Self { merge: Merge::Shown, ..all }),
+            Integrator::LvcHrrSds => Some(Self { roulette: true, merge: Merge::Shown, ..all }),
             Integrator::Pcbpt => Some(Self { base: Base::Probabilistic, ..all }),
             Integrator::PcbptHrr => Some(Self { base: Base::Probabilistic, roulette: true, ..all }),
-            Integrator::Vcm => Some(Self { merging: true, ..all }),
-            Integrator::VcmHrr => Some(Self { merging: true, roulette: true, ..all }),
-            Integrator::Pcvcm => Some(Self { base: Base::Probabilistic, merging: true, ..all }),
+            Integrator::Vcm => Some(Self { merge: Merge::All, ..all }),
+            Integrator::VcmHrr => Some(Self { merge: Merge::All, roulette: true, ..all }),
+            Integrator::Pcvcm => Some(Self { base: Base::Probabilistic, merge: Merge::All, ..all }),
             Integrator::PcvcmHrr => {
-                Some(Self { base: Base::Probabilistic, merging: true, roulette: true, ..all })
+                Some(Self { base: Base::Probabilistic, merge: Merge::All, roulette: true, ..all })
             }
         }
     }

@@ -8,7 +8,7 @@
 
 use super::counters::machine_bytes;
 use crate::film::FilmSettings;
-use crate::integrator::{Costs, Recipe, Size};
+use crate::integrator::{Costs, Merge, Recipe, Size};
 use crate::settings::Settings;
 use crate::tally::Tally;
 
@@ -76,7 +76,7 @@ impl Sizing {
             return None; // the error is told from how iterations of one kind differ
         }
         let recipe = Recipe::of(settings.integrator);
-        if recipe.is_some_and(|r| r.merging) {
+        if recipe.is_some_and(|r| r.merge == Merge::All) {
             return None; // its radius shrinks from iteration to iteration: it needs many
         }
         let pairs = recipe.is_some_and(|r| r.roulette);

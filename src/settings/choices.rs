@@ -62,6 +62,10 @@ choice! {
         Lvc = "lvc",
         /// As `Lvc`, with hierarchical Russian roulette at glossy eye vertices.
         LvcHrr = "lvc+hrr",
+        /// As `Lvc`, and caustics that smooth surfaces show are merged, as by `Vcm`.
+        LvcSds = "lvc+sds",
+        /// As `LvcHrr`, and caustics that smooth surfaces show are merged, as by `Vcm`.
+        LvcHrrSds = "lvc+hrr+sds",
         /// Connections to picks from a few reused light subpaths, in proportion to what they gave nearby.
         Pcbpt = "pcbpt",
         /// As `Pcbpt`, with hierarchical Russian roulette at glossy eye vertices.

@@ -25,8 +25,10 @@ pub enum Origin {
 pub enum Role {
     /// Judged by the roulette of all eye vertices.
     Stored,
-    /// Connected to the camera, and merged.
+    /// Connected to the camera.
     Seen,
+    /// Merged with eye vertices.
+    Merged,
 }
 
 /// The rule by which light vertices are used.
@@ -38,11 +40,13 @@ pub struct Storing {
     pub max_alpha: f64,
     /// Whether vertices straight from a lamp have any role.
     pub lamps: bool,
+    /// Whether merging is for caustics that perfectly smooth surfaces show to the camera, and for nothing else.
+    pub shown_only: bool,
 }
 
 impl Storing {
     /// All of them.
-    pub const ALL: Self = Self { share: 1.0, max_alpha: 1.0, lamps: true };
+    pub const ALL: Self = Self { share: 1.0, max_alpha: 1.0, lamps: true, shown_only: false };
 
     /// What a surface is to the vertex that it throws light on.
     #[inline]
@@ -57,6 +61,7 @@ impl Storing {
         match (role, origin) {
             (_, Origin::Lamp) if !self.lamps => 0.0,
             (Role::Stored, Origin::Lamp | Origin::Broad) => self.share,
+            (Role::Merged, Origin::Lamp | Origin::Broad) if self.shown_only => 0.0,
             _ => 1.0,
         }
     }
@@ -70,8 +75,10 @@ pub struct Total {
     pub known: f64,
     /// Of those that need it stored, over the probability of that.
     pub stored: f64,
-    /// Of those that need it seen or merged, over the probability of that.
+    /// Of those that need it seen, over the probability of that.
     pub seen: f64,
+    /// Of those that need it merged, over the probability of that.
+    pub merged: f64,
 }
 
 impl Total {
@@ -87,6 +94,7 @@ impl Total {
             0.0 => 0.0,
             sum => heuristic.raise(storing.probability(role, origin)) * sum,
         };
-        self.known + share(Role::Stored, self.stored) + share(Role::Seen, self.seen)
+        let stored = self.known + share(Role::Stored, self.stored);
+        stored + share(Role::Seen, self.seen) + share(Role::Merged, self.merged)
     }
 }

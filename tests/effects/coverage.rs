@@ -33,6 +33,9 @@ fn paths_that_nothing_finds_are_an_error_that_names_them() {
     assert_eq!((plan.integrator, plan.is_biased()), (Integrator::Pt, true));
     // What is not there can be left out.
     assert!(!planned(&plain(), &without("sds,lens")).unwrap().is_biased());
+    // Without merging, what meets the light by chance finds all.
+    let plan = planned(&with_cube(mirror()), &without("sds")).unwrap();
+    assert_eq!((plan.integrator, plan.is_biased()), (Integrator::Lvc, false));
     let error = render(&scene, &without("refraction"), &Silent).unwrap_err();
     assert!(error.to_string().contains("refraction cannot be left out"), "{error}");
 }
@@ -46,6 +49,7 @@ fn every_algorithm_refuses_what_it_does_not_find() {
             integrator,
             Integrator::Vcm | Integrator::VcmHrr | Integrator::Pcvcm | Integrator::PcvcmHrr
         );
+        let connected = open[0] || open[open.len() - 1] || open.windows(2).any(|w| w == [true; 2]);
         match integrator {
             // Auto merges where nothing else will do.
             Integrator::Auto => false,
@@ -54,13 +58,14 @@ fn every_algorithm_refuses_what_it_does_not_find() {
             // What the camera sees must be open to connections from light vertices.
             Integrator::Lt => !open[open.len() - 1],
             _ if merges => class.delta_light && !open.contains(&true),
-            // Open at either end, or two in a row.
-            _ => {
-                class.delta_light
-                    && !open[0]
-                    && !open[open.len() - 1]
-                    && !open.windows(2).any(|w| w == [true; 2])
+            // Of caustics, what the camera sees in smooth surfaces.
+            Integrator::LvcSds | Integrator::LvcHrrSds => {
+                let first = open.iter().rposition(|open| *open);
+                let caustic = first.is_some_and(|i| i > 0 && class.surfaces[i - 1] != Vertex::D);
+                class.delta_light && !connected && !caustic
             }
+            // Open at either end, or two in a row.
+            _ => class.delta_light && !connected,
         }
     };
     let mut refused = 0;
@@ -141,7 +146,10 @@ fn the_program_refuses_or_marks_the_image() {
     let (code, _, err) =
         place.run("render scene.toml -o b.exr --integrator auto --max-depth 6 --stats s.json");
     assert!(code == 0 && !err.contains("biased"), "{err}");
-    assert_eq!((&read("s.json")["biased"], &read("s.json")["integrator"]), (&false.into(), &"vcm".into()));
+    assert_eq!(
+        (&read("s.json")["biased"], &read("s.json")["integrator"]),
+        (&false.into(), &"lvc+sds".into())
+    );
     let attributes = hrr::image::read_attributes(&place.path("b.exr")).unwrap();
     assert_eq!(attributes.get("hrr:biased"), Some(&Value::Int(0)));
 }

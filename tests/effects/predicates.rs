@@ -104,7 +104,7 @@ fn cases() -> Vec<Case> {
             "mirror",
             with_cube(mirror()),
             6,
-            "lvc: direct(lamp floor) interreflection(floor cube) light_subpaths(cube) caustics(cube) ~sds(cube) \
+            "lvc+sds: direct(lamp floor) interreflection(floor cube) light_subpaths(cube) caustics(cube) sds(cube) \
              specular(cube)",
         ),
         (
@@ -139,14 +139,14 @@ fn cases() -> Vec<Case> {
             "smooth in parts",
             rough(0.0, 1e-3),
             6,
-            "lvc+hrr: direct(lamp floor cube) interreflection(floor cube) light_subpaths(cube) caustics(cube) sdg(cube) \
-             ~sds(cube) specular(cube) textures(cube)",
+            "lvc+hrr+sds: direct(lamp floor cube) interreflection(floor cube) light_subpaths(cube) caustics(cube) sdg(cube) \
+             sds(cube) specular(cube) textures(cube)",
         ),
         (
             "mirror under a lamp without size",
             lit(with_cube(mirror()), lamp_without_size()),
             6,
-            "vcm: direct(lamp floor) interreflection(floor cube) light_subpaths(cube) caustics(cube) sds(cube) \
+            "lvc+sds: direct(lamp floor) interreflection(floor cube) light_subpaths(cube) caustics(cube) sds(cube) \
              specular(cube)",
         ),
         (
@@ -159,7 +159,7 @@ fn cases() -> Vec<Case> {
             "glass",
             with_cube(glass),
             6,
-            "lvc: direct(lamp floor) interreflection(floor cube) light_subpaths(cube) caustics(cube) ~sds(cube) \
+            "lvc+sds: direct(lamp floor) interreflection(floor cube) light_subpaths(cube) caustics(cube) sds(cube) \
              specular(cube) refraction(cube)",
         ),
         ("veil", changed(plain(), |s| s.materials[2].opacity = 0.5), 6, plus("opacity(cube)")),

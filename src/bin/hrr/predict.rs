@@ -65,7 +65,7 @@ pub fn run(args: &PredictArgs, log: &Log) -> Result<u8> {
     (settings.samples, settings.light_subpaths) = (size.samples, size.light_subpaths);
     settings.integrator = hrr::render::chosen(&scene, &settings)?;
     let name = settings.integrator.name();
-    if Recipe::of(settings.integrator).is_some_and(|r| r.merging) {
+    if Recipe::of(settings.integrator).is_some_and(|r| r.merges()) {
         return Err(Error::Usage(format!(
             "{name} blurs, and its error is not that of noise: nothing can be predicted"
         )));

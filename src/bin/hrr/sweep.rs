@@ -75,7 +75,7 @@ pub fn contenders(
     sweeps: &[Sweep],
 ) -> Result<Vec<Contender>> {
     let base = Settings { integrator: hrr::render::chosen(scene, settings)?, ..settings.clone() };
-    let biased = |s: &Settings| Recipe::of(s.integrator).is_some_and(|r| r.merging);
+    let biased = |s: &Settings| Recipe::of(s.integrator).is_some_and(|r| r.merges());
     let mut list: Vec<Contender> = Vec::new();
     let mut add = |name: String, settings: Settings| {
         if list.iter().all(|c| c.settings != settings) && hrr::render::chosen(scene, &settings).is_ok() {
