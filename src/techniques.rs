@@ -59,8 +59,8 @@ impl Merging {
 /// Where and how hard the roulette plays.
 #[derive(Debug, Clone, Copy)]
 pub struct Roulette {
-    /// m_s / P: light subpaths emitted for each eye sample of a pixel. All samples of a pixel judge the same light
-    /// vertices, so that for the weights they share them, though each one really tries them all.
+    /// m_s / P: light subpaths that an eye sample counts for having tried. All samples of a pixel judge the same light
+    /// vertices, so that for the weights many of them share these, though each one really tries them all.
     pub light_subpaths: f64,
     /// C, world units squared.
     pub constant: f64,

@@ -23,6 +23,9 @@ use crate::vertex_bvh::VertexBvh;
 use std::f64::consts::PI;
 use std::time::Instant;
 
+/// Samples of a pixel that the roulette's pairs count for as if each had light vertices of its own. More of them share the
+/// vertices, though not the pairs; measured in benches/record/integrators.md.
+const SHARERS: f64 = 8.0;
 /// Share of an iteration's progress that the light side stands for.
 const LIGHT_SHARE: f64 = 0.3;
 
@@ -128,7 +131,7 @@ impl<'a> Bidirectional<'a> {
             storing: self.techniques.storing,
             guide: self.techniques.guide.clone(),
             roulette: recipe.roulette.then(|| Roulette {
-                light_subpaths: n_l / eye_samples,
+                light_subpaths: n_l / eye_samples * SHARERS.min(eye_samples),
                 constant: expected * area / vertices,
                 // On the axis of lobes of weight c, C c / d^2 is then at most X at d^2 = A / 4 pi.
                 most: self.settings.axis_probability.map_or(f64::INFINITY, |x| x * area / (4.0 * PI)),
