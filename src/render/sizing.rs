@@ -44,6 +44,8 @@ pub(super) struct Sizing {
     memory: f64,
     light_subpaths_per_sample: f64,
     preview: Size,
+    /// Whether playing the roulette takes the longer the more light vertices there are: where what it may keep of each is set.
+    grows: bool,
 }
 
 /// What an iteration was measured to take.
@@ -94,6 +96,7 @@ impl Sizing {
             memory: bytes,
             light_subpaths_per_sample: f64::from(film.width) * f64::from(film.height),
             preview: Size::of(settings, film),
+            grows: pairs && settings.axis_probability.is_some(),
         })
     }
 
@@ -130,8 +133,20 @@ impl Sizing {
                 let light = share(&Costs { seconds, per_subpath, per_sample }).unwrap_or(LIGHT);
                 let subpaths =
                     self.most_subpaths(last).min(light * seconds / per_subpath.max(1e-12)).max(1.0);
-                // In the same proportion where memory is short.
-                self.size((1.0 / light - 1.0) * subpaths * per_subpath / per_sample, subpaths)
+                match self.playing(last) {
+                    // In the same proportion where memory is short.
+                    0.0 => self.size((1.0 / light - 1.0) * subpaths * per_subpath / per_sample, subpaths),
+                    playing => {
+                        // As many samples as before at least, each with as many times the work as there are light subpaths.
+                        let last_subpaths = last.size.light_subpaths as f64;
+                        let least = per_sample * f64::from(last.size.samples);
+                        let most = 1.0 + ((1.0 - light) * seconds / least - 1.0) / playing;
+                        let growth = (subpaths / last_subpaths).min(most.max(1.0));
+                        let eye = seconds - growth * last_subpaths * per_subpath;
+                        let samples = eye / (per_sample * (1.0 + playing * (growth - 1.0)));
+                        self.size(samples, growth * last_subpaths)
+                    }
+                }
             }
             Open::LightSubpaths => {
                 let eye_side = per_sample * f64::from(last.size.samples);
@@ -159,12 +174,19 @@ impl Sizing {
         let weight = if weighted { weight.round().clamp(1.0, 1e6) as u32 } else { 1 };
         // Less where memory is short.
         let planned = size.light_subpaths as f64 * per_subpath + f64::from(size.samples) * per_sample;
-        Some(Next { size, weight, seconds: planned.min(seconds) })
+        Some(Next { size, weight, seconds: if self.grows { seconds } else { planned.min(seconds) } })
     }
 
     fn size(&self, samples: f64, subpaths: f64) -> Size {
         let samples = samples.round().clamp(1.0, 65535.0) as u32;
         Size { samples, light_subpaths: (subpaths as u64).max(1) }
+    }
+
+    /// The share of a sample's time that grows with the light vertices.
+    fn playing(&self, last: &Measured) -> f64 {
+        let Tally { eye_trace, roulette_seconds, visibility, playing, .. } = last.tally;
+        let all = eye_trace + roulette_seconds + visibility;
+        if self.grows && all > 0.0 { (playing / all).min(1.0) } else { 0.0 }
     }
 
     /// How many light subpaths fit the memory, and a tree.
@@ -189,13 +211,26 @@ mod tests {
         per_sample: f64,
         vertex_bytes: f64,
     ) -> (Vec<(Size, u32)>, f64) {
+        play_growing(settings, per_subpath, [per_sample, 0.0], vertex_bytes)
+    }
+
+    /// The same, where a sample costs more with each light subpath.
+    fn play_growing(
+        settings: &Settings,
+        per_subpath: f64,
+        per_sample: [f64; 2],
+        vertex_bytes: f64,
+    ) -> (Vec<(Size, u32)>, f64) {
         let sizing = Sizing::new(settings, &FILM).unwrap();
         let (mut size, mut elapsed, mut sizes) = (Size::of(settings, &FILM), 0.0, Vec::new());
         loop {
-            let sides = [per_subpath * size.light_subpaths as f64, per_sample * f64::from(size.samples)];
+            let (n, samples) = (size.light_subpaths as f64, f64::from(size.samples));
+            let playing = per_sample[1] * n * samples;
+            let sides = [per_subpath * n, per_sample[0] * samples + playing];
             elapsed += sides[0] + sides[1];
             let bytes = (vertex_bytes * size.light_subpaths as f64) as usize;
-            let last = Measured { size, tally: Tally { sides, ..Tally::default() }, bytes };
+            let tally = Tally { sides, playing, eye_trace: sides[1], ..Tally::default() };
+            let last = Measured { size, tally, bytes };
             match sizing.next(elapsed, &last, &|_| None) {
                 Some(next) => sizes.push((next.size, next.weight)),
                 None => return (sizes, elapsed),
@@ -218,6 +253,15 @@ mod tests {
         let ratio = last.light_subpaths as f64 * 1e-6 / (f64::from(last.samples) * 0.05);
         assert!((ratio * (1.0 / LIGHT - 1.0) - 1.0).abs() < 0.02, "{ratio}");
         assert!(last.light_subpaths > 11_000_000 && weight > 1100);
+    }
+
+    #[test]
+    fn a_roulette_that_takes_longer_with_more_vertices_ends_in_time() {
+        let settings = Settings { axis_probability: Some(4.0), ..timed(Integrator::LvcHrr) };
+        for per_pair in [1e-9, 1e-8, 1e-7, 1e-6] {
+            let (sizes, took) = play_growing(&settings, 1e-6, [0.02, per_pair], 20.0);
+            assert!((took / 40.0 - 1.0).abs() < 0.05, "{per_pair}: {took} {sizes:?}");
+        }
     }
 
     #[test]

@@ -377,8 +377,9 @@ pub const TABLE: &[Setting] = &[
         default: "1.0",
         value_name: "PIXELS",
         heading: TRANSPORT,
-        help: "Radius of vertex merging (vcm) in the first iteration, in pixels",
-        doc: "A pixel is as large as at the median distance of what the camera sees.",
+        help: "Radius of vertex merging (vcm, +sds) in the first iteration, in pixels",
+        doc: "A pixel is as large as at the median distance of what the camera sees. With +sds: over the root of the \
+              samples of a pixel in an iteration.",
     },
     Setting {
         name: "merge_shrink",

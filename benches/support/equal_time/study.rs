@@ -31,6 +31,11 @@ const PCBPT_SPHEROID: Recipe = Recipe {
     name: "pcbpt+hrr spheroid",
     set: |s| Settings { integrator: Integrator::PcbptHrr, range: Range::Spheroid, ..s },
 };
+/// As the slides have it: P on the axis is the same for either shape, wherever it is not 1, and samples are the same for all pixels.
+const ELLIPSOID: Recipe =
+    Recipe { name: "pcbpt+hrr X=4", set: |s| Settings { range: Range::Ellipsoid, ..on_the_axis(s) } };
+const SPHEROID: Recipe =
+    Recipe { name: "pcbpt+hrr X=4 spheroid", set: |s| Settings { range: Range::Spheroid, ..on_the_axis(s) } };
 const PT: Recipe = Recipe { name: "pt", set: |s| Settings { integrator: Integrator::Pt, ..s } };
 const LVC: Recipe = Recipe { name: "lvc", set: |s| Settings { integrator: Integrator::Lvc, ..s } };
 const LVC_HRR: Recipe = Recipe { name: "lvc+hrr", set: |s| Settings { integrator: Integrator::LvcHrr, ..s } };
@@ -60,6 +65,18 @@ const UNADDED: Recipe = Recipe {
     },
 };
 
+/// The roulette's probability set by what it is on the axis alone.
+fn on_the_axis(settings: Settings) -> Settings {
+    let (axis_probability, expected) = (Some(4.0), 1e6);
+    Settings {
+        integrator: Integrator::PcbptHrr,
+        axis_probability,
+        expected,
+        adaptive: Switch::Off,
+        ..settings
+    }
+}
+
 /// One sample of each pixel in every iteration, and as many light subpaths as 200 x 150 pixels.
 fn small(settings: Settings) -> Settings {
     Settings { samples: 1, light_subpaths: 30_000, ..settings }
@@ -77,6 +94,8 @@ pub fn of(study: &str, size: [u32; 2]) -> Option<(Vec<Variant>, Vec<Recipe>)> {
         "mirror" => (vec![judged(load("caustic_mirror"), "mirror")], vec![PCBPT, PCBPT_HRR]),
         // Caustics reflected in brushed metal of roughness 1e-4 and 1e-2.
         "brushed" => (vec![judged(load("brushed_funnel"), "steel")], vec![PCBPT, PCBPT_HRR, PCBPT_SPHEROID]),
+        // Ranges in brushed metal, by their shape.
+        "ranges" => (vec![judged(load("brushed_funnel"), "steel")], vec![SPHEROID, ELLIPSOID]),
         // What the roulette costs beside merging.
         "merging" => {
             (["mirror_room", "cornell"].map(|s| variant(load(s), "mirror")).into(), vec![PCVCM, PCVCM_HRR])
