@@ -64,8 +64,14 @@ pub struct Bidirectional<'a> {
 impl<'a> Bidirectional<'a> {
     /// Prepares a recipe: a pre-pass over light subpaths sets the constants of roulette and weights.
     pub fn new(world: &'a World<'a>, settings: &'a Settings, recipe: Recipe) -> Result<Self> {
-        // Without a surface to play at, the roulette is not there at all.
-        let recipe = Recipe { roulette: recipe.roulette && plays_somewhere(world.scene, settings), ..recipe };
+        // Without a surface to play at, the roulette is not there at all; nor merging without one that shows anything.
+        let any = |has: fn(&Lobes) -> bool| somewhere(world.scene, settings, has);
+        let nothing_shown = recipe.merge == Merge::Shown && !any(|lobes| lobes.delta);
+        let recipe = Recipe {
+            roulette: recipe.roulette && any(|lobes| lobes.open),
+            merge: if nothing_shown { Merge::Off } else { recipe.merge },
+            ..recipe
+        };
         let mut machine = Self {
             world,
             settings,
@@ -143,10 +149,10 @@ impl<'a> Bidirectional<'a> {
     }
 }
 
-/// Whether any surface has lobes for the roulette, anywhere on it.
-fn plays_somewhere(scene: &Scene, settings: &Settings) -> bool {
-    let open: Vec<bool> = scene.materials.iter().map(|m| Lobes::of(m, settings.hrr_alpha).open).collect();
-    scene.mesh.materials.iter().any(|&m| open[m as usize])
+/// Whether any surface has such lobes, anywhere on it.
+fn somewhere(scene: &Scene, settings: &Settings, has: fn(&Lobes) -> bool) -> bool {
+    let has: Vec<bool> = scene.materials.iter().map(|m| has(&Lobes::of(m, settings.hrr_alpha))).collect();
+    scene.mesh.materials.iter().any(|&m| has[m as usize])
 }
 
 impl Integrator for Bidirectional<'_> {

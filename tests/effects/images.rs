@@ -157,6 +157,13 @@ fn machinery_without_an_effect_changes_no_bit() {
         assert_eq!(integrators, plans);
         assert_eq!(bits(&scene, &without), bits(&scene, &with_roulette));
     }
+    // Nothing smooth: there is nothing that shows caustics to merge.
+    let merged = Settings { integrator: Integrator::LvcSds, ..settings() };
+    assert_eq!(bits(&plain(), &with("light_subpaths")), bits(&plain(), &merged));
+    let shown = lit(with_cube(mirror()), lamp_without_size());
+    let many = Settings { samples: 32, ..settings() };
+    let unmerged = Settings { without: "sds".parse().unwrap(), ..many.clone() };
+    assert_ne!(bits(&shown, &many), bits(&shown, &unmerged));
     // Every surface looks up the middle of the first of two pixels.
     let looked_up = |mut scene: Scene| {
         scene.mesh.uvs = vec![Vec2::new(0.25, 0.5); scene.mesh.positions.len()];

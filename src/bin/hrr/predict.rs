@@ -67,7 +67,7 @@ pub fn run(args: &PredictArgs, log: &Log) -> Result<u8> {
     let name = settings.integrator.name();
     if Recipe::of(settings.integrator).is_some_and(|r| r.merges()) {
         return Err(Error::Usage(format!(
-            "{name} blurs, and its error is not that of noise: nothing can be predicted"
+            "{name} blurs, and its error is not that of noise: nothing can be predicted; name an integrator that does not merge"
         )));
     }
     let contenders = [Contender { name: name.into(), settings: settings.clone(), biased: false }];
