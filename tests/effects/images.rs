@@ -325,13 +325,18 @@ fn what_is_inert_or_absent_does_not_change_the_mean() {
         ("plain", plain(), Effect::Sdg, Verdict::Absent, Integrator::LvcHrr),
         ("plain", plain(), Effect::Sds, Verdict::Absent, Integrator::LvcSds),
         ("mirror", with_cube(mirror()), Effect::Sdg, Verdict::Absent, Integrator::LvcHrrSds),
+        // Wanted for its noise alone: without, all of the light is found as well.
+        ("mirror", with_cube(mirror()), Effect::Sds, Verdict::Wanted, Integrator::Lvc),
     ]
     .into_iter()
     .enumerate()
     {
         let seed = 2 * seed as u64;
         assert_eq!(analyze(&scene, &settings()).of(effect).verdict, verdict, "{name}, {effect}");
-        let forced = with(effect.id());
+        let forced = match verdict {
+            Verdict::Wanted => Settings { without: effect.id().parse().unwrap(), ..settings() },
+            _ => with(effect.id()),
+        };
         assert_eq!(planned(&scene, &forced).unwrap().integrator, integrator, "{name}, {effect}");
         let auto = tiles(&scene, &settings(), seed);
         for (tile, (a, b)) in auto.iter().zip(tiles(&scene, &forced, seed + 1)).enumerate() {
