@@ -1,7 +1,7 @@
 //! Recipes against each other at equal time, as the slides compare them: each is run several times with different seeds,
 //! in turn with the others, and every run's errors are written down.
 //!
-//! `cargo bench --bench equal_time -- STUDY DIRECTORY [seconds] [runs] [size] [threads] [scenes]`
+//! `cargo bench --bench equal_time -- STUDY DIRECTORY [seconds] [runs] [size] [threads] [scenes] [recipes]`
 //!
 //! STUDY: `mirror`, `brushed`, `ranges`, `merging`, `graceful`, `graceful_pc`, `convergence`, `additions` (see [`study::of`]). Writes DIRECTORY/STUDY.csv, a picture of each
 //! recipe's first run and one of where its runs differ; benches/record/equal_time.md tells what came of it.
@@ -36,7 +36,9 @@ fn main() {
     let args: Vec<String> = std::env::args().skip(1).filter(|a| !a.starts_with("--")).collect();
     let [name, directory] = [0, 1].map(|i| args.get(i).map(String::as_str));
     let (Some(name), Some(directory)) = (name, directory) else {
-        println!("equal_time: STUDY DIRECTORY [seconds] [runs] [size] [threads] [scene,scene...]");
+        println!(
+            "equal_time: STUDY DIRECTORY [seconds] [runs] [size] [threads] [scene,scene...] [recipe,recipe...]"
+        );
         return;
     };
     let number = |i: usize, default: f64| args.get(i).and_then(|a| a.parse().ok()).unwrap_or(default);
@@ -44,10 +46,10 @@ fn main() {
     let size: Vec<u32> = size.split('x').map(|n| n.parse().expect("WIDTHxHEIGHT")).collect();
     let budget =
         Budget { seconds: number(2, 60.0), runs: number(3, 8.0) as u64, threads: number(5, 0.0) as usize };
-    let (mut variants, recipes) = study::of(name, [size[0], size[1]]).expect("one of the studies");
-    if let Some(wanted) = args.get(6) {
-        variants.retain(|variant| wanted.split(',').any(|name| name == variant.name));
-    }
+    let (mut variants, mut recipes) = study::of(name, [size[0], size[1]]).expect("one of the studies");
+    let among = |i: usize, name: &str| args.get(i).is_none_or(|list| list.split(',').any(|n| n == name));
+    variants.retain(|variant| among(6, variant.name.split(' ').next().unwrap_or_default()));
+    recipes.retain(|recipe| among(7, recipe.name));
     let mut table = String::from(measure::HEADER);
     for variant in &variants {
         table += &compare(variant, &recipes, &budget, Path::new(directory));

@@ -72,6 +72,7 @@ impl EyeVertex {
         }
     }
 
+    #[inline(always)]
     fn new(techniques: &Techniques, walk: Walk, m_previous: Total, m_emitter: f64, shown: bool) -> Self {
         let delta = walk.vertex.bsdf.is_delta();
         let lobes = if delta { Lobes::NONE } else { techniques.lobes(&walk.vertex, walk.vertex.wo) };

@@ -92,6 +92,10 @@ impl Reflectance {
     pub fn at(&self, cos_i: f64) -> Spectrum {
         let cos_i = cos_i.clamp(0.0, 1.0);
         match *self {
+            // Grey metals, mirrors among them, are many.
+            Self::Complex { eta, k } if eta == Spectrum::splat(eta.x) && k == Spectrum::splat(k.x) => {
+                Spectrum::splat(conductor(cos_i, eta.x, k.x))
+            }
             Self::Complex { eta, k } => Spectrum::new(
                 conductor(cos_i, eta.x, k.x),
                 conductor(cos_i, eta.y, k.y),

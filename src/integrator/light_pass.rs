@@ -21,8 +21,11 @@ use std::time::Instant;
 const CHUNK: u64 = 1024;
 /// Light subpaths of the pre-pass that estimates how many vertices one leaves.
 const PILOT: u64 = 16 * CHUNK;
-/// Light subpaths whose vertices all are kept for uniform picks: enough for eye samples not to share many.
+/// Light subpaths whose vertices all are kept to pick from: at most, and of uniform picks at least and for each sample of a pixel,
+/// so that these do not share many, and what is picked is near at hand in the processor's cache.
 const PICKED: u64 = 64 * CHUNK;
+const LEAST_PICKED: u64 = 8 * CHUNK;
+const PICKED_EACH: u64 = 64;
 /// Samples of a pixel from which on it pays to sort what they pick from.
 const SORTED: u32 = 4;
 /// Cells along each axis of the curve that they are sorted along.
@@ -55,7 +58,13 @@ impl Bidirectional<'_> {
         match (self.all_apart(), self.recipe.merge) {
             (false, _) => 0,
             (true, Merge::All) => self.size.light_subpaths,
-            (true, _) => self.size.light_subpaths.min(PICKED),
+            (true, _) => {
+                let wanted = match self.recipe.base {
+                    Base::Uniform => PICKED_EACH * u64::from(self.size.samples),
+                    _ => PICKED,
+                };
+                self.size.light_subpaths.min(wanted.clamp(LEAST_PICKED, PICKED))
+            }
         }
     }
 

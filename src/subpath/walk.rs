@@ -82,6 +82,7 @@ impl Walk {
     }
 
     /// Arrives at the surface that a segment meets.
+    #[inline(always)]
     pub fn arrive(
         world: &World<'_>,
         rules: &Rules,
@@ -119,6 +120,7 @@ impl Walk {
     }
 
     /// Scatters at the vertex. `total` gives [`Start::total`] for the way the path goes on.
+    #[inline(always)]
     pub fn scatter(
         &self,
         rules: &Rules,
@@ -139,6 +141,7 @@ impl Walk {
     }
 
     /// Goes on along a segment that ends at `point`.
+    #[inline(always)]
     pub fn go_on(
         &self,
         world: &World<'_>,

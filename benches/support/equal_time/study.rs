@@ -37,6 +37,7 @@ const ELLIPSOID: Recipe =
 const SPHEROID: Recipe =
     Recipe { name: "pcbpt+hrr X=4 spheroid", set: |s| Settings { range: Range::Spheroid, ..on_the_axis(s) } };
 const PT: Recipe = Recipe { name: "pt", set: |s| Settings { integrator: Integrator::Pt, ..s } };
+const BPT: Recipe = Recipe { name: "bpt", set: |s| Settings { integrator: Integrator::Bpt, ..s } };
 const LVC: Recipe = Recipe { name: "lvc", set: |s| Settings { integrator: Integrator::Lvc, ..s } };
 const LVC_HRR: Recipe = Recipe { name: "lvc+hrr", set: |s| Settings { integrator: Integrator::LvcHrr, ..s } };
 /// What the others are judged by: as many light subpaths as there is time for, whatever the scene sets.
@@ -112,17 +113,25 @@ pub fn of(study: &str, size: [u32; 2]) -> Option<(Vec<Variant>, Vec<Recipe>)> {
                 vec![ALL, UNGUIDED, ALL_STORED, UNSPREAD, SMALL, PLAIN],
             )
         }
-        // How errors fall with time.
+        // How errors fall with time: in a scene without narrow lobes, in one whose caustic every recipe meets often
+        // enough for an error to be told, and in one where only the roulette does.
         "convergence" => {
-            let scenes = ["caustic_mirror", "cornell"];
-            let times = scenes.iter().flat_map(|scene| {
+            let mut rough = load("caustic_mirror");
+            roughen(&mut rough, "mirror", 0.05, 0.05);
+            roughen(&mut rough, "brass", 0.2, 0.2);
+            let scenes = [
+                ("cornell", load("cornell")),
+                ("rough_mirror", rough),
+                ("caustic_mirror", load("caustic_mirror")),
+            ];
+            let times = scenes.iter().flat_map(|(name, scene)| {
                 [0.125, 0.25, 0.5, 1.0].map(|time| Variant {
-                    name: format!("{scene} x{time}"),
+                    name: format!("{name} x{time}"),
                     time,
-                    ..variant(load(scene), "mirror")
+                    ..variant(scene.clone(), "mirror")
                 })
             });
-            (times.collect(), vec![PT, LVC, PCBPT, LVC_HRR, PCBPT_HRR])
+            (times.collect(), vec![PT, BPT, LVC, PCBPT, LVC_HRR, PCBPT_HRR])
         }
         _ => return None,
     })
