@@ -3,7 +3,7 @@
 //!
 //! `cargo bench --bench equal_time -- STUDY DIRECTORY [seconds] [runs] [size] [threads] [scenes] [recipes]`
 //!
-//! STUDY: `mirror`, `brushed`, `ranges`, `merging`, `graceful`, `graceful_pc`, `convergence`, `additions` (see [`study::of`]). Writes DIRECTORY/STUDY.csv, a picture of each
+//! STUDY: `mirror`, `brushed`, `ranges`, `merging`, `graceful`, `graceful_pc`, `convergence`, `additions`, `energy` (see [`study::of`]). Writes DIRECTORY/STUDY.csv, a picture of each
 //! recipe's first run and one of where its runs differ; benches/record/equal_time.md tells what came of it.
 
 #[path = "support/equal_time/measure.rs"]

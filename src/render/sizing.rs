@@ -141,8 +141,13 @@ impl Sizing {
                         let last_subpaths = last.size.light_subpaths as f64;
                         let least = per_sample * f64::from(last.size.samples);
                         let most = 1.0 + ((1.0 - light) * seconds / least - 1.0) / playing;
-                        let growth = (subpaths / last_subpaths).min(most.max(1.0));
-                        let eye = seconds - growth * last_subpaths * per_subpath;
+                        let wanted = subpaths / last_subpaths;
+                        let growth = wanted.min(most.max(1.0));
+                        let light_side = growth * last_subpaths * per_subpath;
+                        let rest = seconds - light_side;
+                        // In the same proportion where memory is short, as above.
+                        let eye =
+                            if growth < wanted { rest } else { rest.min((1.0 / light - 1.0) * light_side) };
                         let samples = eye / (per_sample * (1.0 + playing * (growth - 1.0)));
                         self.size(samples, growth * last_subpaths)
                     }
@@ -173,8 +178,10 @@ impl Sizing {
         let weighted = self.pairs && self.open != Open::Samples;
         let weight = if weighted { weight.round().clamp(1.0, 1e6) as u32 } else { 1 };
         // Less where memory is short.
+        let growth = size.light_subpaths as f64 / last.size.light_subpaths.max(1) as f64;
+        let per_sample = per_sample * (1.0 + self.playing(last) * (growth - 1.0));
         let planned = size.light_subpaths as f64 * per_subpath + f64::from(size.samples) * per_sample;
-        Some(Next { size, weight, seconds: if self.grows { seconds } else { planned.min(seconds) } })
+        Some(Next { size, weight, seconds: planned.min(seconds) })
     }
 
     fn size(&self, samples: f64, subpaths: f64) -> Size {
@@ -261,6 +268,11 @@ mod tests {
         for per_pair in [1e-9, 1e-8, 1e-7, 1e-6] {
             let (sizes, took) = play_growing(&settings, 1e-6, [0.02, per_pair], 20.0);
             assert!((took / 40.0 - 1.0).abs() < 0.05, "{per_pair}: {took} {sizes:?}");
+        }
+        // Where memory is short as well, in several iterations.
+        for per_pair in [1e-9, 1e-8] {
+            let (sizes, took) = play_growing(&settings, 1e-6, [0.02, per_pair], 100.0);
+            assert!(sizes.len() >= 4 && (took / 40.0 - 1.0).abs() < 0.05, "{per_pair}: {took} {sizes:?}");
         }
     }
 

@@ -54,6 +54,14 @@ const PLAIN: Recipe = Recipe {
     set: |s| Settings { guiding: AutoSwitch::Off, storing: 1.0, adaptive: Switch::Off, ..small(s) },
 };
 
+/// One iteration of the same size: eye subpaths are then the same, and what they find by chance cancels between recipes.
+const PAIRED: Recipe = Recipe { name: "all", set: paired };
+const PAIRED_UNGUIDED: Recipe =
+    Recipe { name: "guiding off", set: |s| Settings { guiding: AutoSwitch::Off, ..paired(s) } };
+const PAIRED_STORED: Recipe = Recipe { name: "all stored", set: |s| Settings { storing: 1.0, ..paired(s) } };
+const PAIRED_PCBPT: Recipe =
+    Recipe { name: "pcbpt+hrr", set: |s| Settings { integrator: Integrator::PcbptHrr, ..paired(s) } };
+
 /// What judges these: other connections, and none of the additions but large iterations.
 const UNADDED: Recipe = Recipe {
     name: "pcbpt+hrr",
@@ -74,6 +82,19 @@ fn on_the_axis(settings: Settings) -> Settings {
         axis_probability,
         expected,
         adaptive: Switch::Off,
+        ..settings
+    }
+}
+
+/// One iteration of 36 samples and 600 000 light subpaths, guided.
+fn paired(settings: Settings) -> Settings {
+    Settings {
+        integrator: Integrator::LvcHrr,
+        guiding: AutoSwitch::On,
+        samples: 36,
+        light_subpaths: 600_000,
+        iterations: 1,
+        time: None,
         ..settings
     }
 }
@@ -112,6 +133,12 @@ pub fn of(study: &str, size: [u32; 2]) -> Option<(Vec<Variant>, Vec<Recipe>)> {
                 SCENES.iter().chain(&["specular_room"]).map(judged).collect(),
                 vec![ALL, UNGUIDED, ALL_STORED, UNSPREAD, SMALL, PLAIN],
             )
+        }
+        // That guiding, storing and other connections keep the energy, by pairs of runs with the same eye subpaths.
+        "energy" => {
+            let scenes = SCENES.iter().chain(&["specular_room"]);
+            let recipes = vec![PAIRED, PAIRED_UNGUIDED, PAIRED_STORED, PAIRED_PCBPT];
+            (scenes.map(|s| variant(load(s), "mirror")).collect(), recipes)
         }
         // How errors fall with time: in a scene without narrow lobes, in one whose caustic every recipe meets often
         // enough for an error to be told, and in one where only the roulette does.
