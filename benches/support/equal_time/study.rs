@@ -140,8 +140,8 @@ pub fn of(study: &str, size: [u32; 2]) -> Option<(Vec<Variant>, Vec<Recipe>)> {
             let recipes = vec![PAIRED, PAIRED_UNGUIDED, PAIRED_STORED, PAIRED_PCBPT];
             (scenes.map(|s| variant(load(s), "mirror")).collect(), recipes)
         }
-        // How errors fall with time: in a scene without narrow lobes, in one whose caustic every recipe meets often
-        // enough for an error to be told, and in one where only the roulette does.
+        // How errors fall with time: in a plain room, in a scene whose caustic every recipe meets often enough for an
+        // error to be told, and in one where only the roulette does.
         "convergence" => {
             let mut rough = load("caustic_mirror");
             roughen(&mut rough, "mirror", 0.05, 0.05);
