@@ -9,11 +9,9 @@ use hrr::report::bootstrap::Interval;
 
 /// Share of pixels that trimmed errors leave out: the worst thousandth.
 const TRIMMED: f64 = 1e-3;
-/// Share of pixels, the noisiest of the reference, that are left out where energy is compared: light is as much everywhere else.
-const UNSTEADY: f64 = 0.02;
 
 pub const HEADER: &str =
-    "scene,recipe,seed,seconds,cpu_seconds,iterations,mean,steady_mean,mse,rmse,region_mse,error_square\n";
+    "scene,recipe,seed,seconds,cpu_seconds,iterations,mean,mse,rmse,region_mse,error_square\n";
 
 /// What a run took.
 pub struct Cost {
@@ -32,8 +30,6 @@ pub struct Run {
 pub struct Errors {
     /// Mean of the image's luminance.
     pub mean: f64,
-    /// The same of the pixels where the reference is not noisiest.
-    pub steady: f64,
     /// Mean square error of all pixels, over channels.
     pub mse: f64,
     /// The same of the region's pixels; NaN where there is none.
@@ -51,8 +47,6 @@ pub struct Yardstick<'a> {
     noise: Vec<DVec3>,
     /// Noise of a pixel of the reference beyond which relative errors leave it out: that of its worst thousandth.
     noisiest: f64,
-    /// The same for energy.
-    unsteady: f64,
     /// Images that are part of the mean, if the runs are.
     own: Option<usize>,
 }
@@ -74,15 +68,12 @@ impl<'a> Yardstick<'a> {
             })
             .collect();
         let mut sums: Vec<f64> = noise.iter().map(|n| n.element_sum()).collect();
-        let mut without = |share: f64| match reference {
-            Some(_) => {
-                let kept = sums.len() - 1 - (share * sums.len() as f64) as usize;
-                *sums.select_nth_unstable_by(kept, f64::total_cmp).1
-            }
+        let kept = sums.len() - 1 - (TRIMMED * sums.len() as f64) as usize;
+        let noisiest = match reference {
+            Some(_) => *sums.select_nth_unstable_by(kept, f64::total_cmp).1,
             None => f64::INFINITY,
         };
-        let (noisiest, unsteady) = (without(TRIMMED), without(UNSTEADY));
-        Self { region, mean, noise, noisiest, unsteady, own: reference.is_none().then_some(runs.len()) }
+        Self { region, mean, noise, noisiest, own: reference.is_none().then_some(runs.len()) }
     }
 
     /// The square error of a pixel, as well as it can be told.
@@ -114,12 +105,7 @@ impl<'a> Yardstick<'a> {
             .filter(|&i| self.noise[i].element_sum() <= self.noisiest)
             .map(|i| local_square(self.square(image, i), tile(i), eps))
             .collect();
-        let steady: Vec<f64> = (0..all)
-            .filter(|&i| self.noise[i].element_sum() <= self.unsteady)
-            .map(|i| luminance(image.pixels[i].as_dvec3()))
-            .collect();
         Errors {
-            steady: steady.iter().sum::<f64>() / steady.len() as f64,
             mean: image.pixels.iter().map(|p| luminance(p.as_dvec3())).sum::<f64>() / all as f64,
             mse: mean_of(&mut (0..all)),
             region_mse: mean_of(&mut self.region.iter().copied()),
@@ -149,14 +135,13 @@ pub fn mean<'a>(images: impl Iterator<Item = &'a Image> + Clone) -> Image {
 
 pub fn row(variant: &Variant, recipe: &Recipe, seed: usize, cost: &Cost, errors: &Errors) -> String {
     format!(
-        "{},{},{seed},{:.3},{:.3},{},{:.6e},{:.6e},{:.6e},{:.6e},{:.6e},{:.6e}\n",
+        "{},{},{seed},{:.3},{:.3},{},{:.6e},{:.6e},{:.6e},{:.6e},{:.6e}\n",
         variant.name,
         recipe.name,
         cost.seconds,
         cost.cpu,
         cost.iterations,
         errors.mean,
-        errors.steady,
         errors.mse,
         errors.mse.max(0.0).sqrt(),
         errors.region_mse,
@@ -172,9 +157,8 @@ pub fn ratios(first: &[Errors], errors: &[Errors]) -> String {
         format!("{:.4} [{:.4}, {:.4}]", i.value, i.low, i.high)
     };
     format!(
-        "mean {}, steady {}; MSE {}; region {}; relative {}",
+        "mean {}; MSE {}; region {}; relative {}",
         over(&|e| e.mean),
-        over(&|e| e.steady),
         over(&|e| e.mse),
         over(&|e| e.region_mse),
         over(&|e| e.trimmed),
