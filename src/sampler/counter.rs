@@ -77,15 +77,34 @@ pub enum Purpose {
 }
 
 impl Purpose {
-    /// Whether few numbers of it decide much, so that it pays to spread them evenly.
+    /// Where few numbers decide much, so that it pays to spread them evenly: the sequence, and the dimension of the first.
+    /// Purposes of one sequence are spread evenly together: those that survive, or are of one lobe or light, are so too.
     #[inline(always)]
-    fn is_even(self) -> bool {
+    fn even(self) -> Option<(Sequence, usize)> {
         use Purpose::*;
-        matches!(
-            self,
-            Raster | Lens | LightPick | LightPoint | LightDirection | Lobe | Direction | Survival | CachePick
-        )
+        match self {
+            Raster => Some((Sequence::Camera, 0)),
+            Lens => Some((Sequence::Camera, 2)),
+            LightPoint => Some((Sequence::Light, 0)),
+            LightPick => Some((Sequence::Light, 2)),
+            LightDirection => Some((Sequence::Light, 3)),
+            Direction => Some((Sequence::Scattering, 0)),
+            Survival => Some((Sequence::Scattering, 2)),
+            Lobe => Some((Sequence::Scattering, 3)),
+            CachePick => Some((Sequence::Cache, 0)),
+            Storing | RecordPick | Roulette | EmitterRoulette => None,
+        }
     }
+}
+
+/// The sequences of points at a depth.
+#[derive(Debug, Clone, Copy)]
+#[repr(u64)]
+enum Sequence {
+    Camera,
+    Light,
+    Scattering,
+    Cache,
 }
 
 /// Depths up to this one have their numbers spread evenly over a family. Deeper, too little depends on one number alone.
@@ -131,22 +150,24 @@ impl Sampler {
         combine(self.key, (u64::from(depth) << 8) | purpose as u64)
     }
 
-    /// The place in the family and the key of a purpose, where numbers are spread evenly.
+    /// `N` numbers for a purpose that are spread evenly over the family; `None` where they are independent. `n` tells several
+    /// such apart.
     #[inline(always)]
-    fn even(&self, depth: u32, purpose: Purpose) -> Option<(Place, u64)> {
-        match self.family {
-            Some((family, place)) if depth <= EVEN_DEPTHS && purpose.is_even() => {
-                Some((place, combine(family, (u64::from(depth) << 8) | purpose as u64)))
-            }
-            _ => None,
+    fn even<const N: usize>(&self, depth: u32, purpose: Purpose, n: u32) -> Option<[f64; N]> {
+        let (family, place) = self.family.filter(|_| depth <= EVEN_DEPTHS)?;
+        let (sequence, dimension) = purpose.even()?;
+        let mut key = combine(family, (u64::from(depth) << 8) | sequence as u64);
+        if n > 0 {
+            key = combine(key, n.into());
         }
+        Some(place.point(key, dimension).map(fraction))
     }
 
     /// Uniform in [0,1): 53 bits, or the 32 of a number that is spread evenly, which is never 0.
     #[inline(always)]
     pub fn u1(&self, depth: u32, purpose: Purpose) -> f64 {
-        match self.even(depth, purpose) {
-            Some((place, key)) => fraction(place.point1(key)),
+        match self.even(depth, purpose, 0) {
+            Some([u]) => u,
             None => unit(self.bits(depth, purpose)),
         }
     }
@@ -154,11 +175,8 @@ impl Sampler {
     /// Two independent uniforms in [0,1), as [`Sampler::u1`] gives one.
     #[inline(always)]
     pub fn u2(&self, depth: u32, purpose: Purpose) -> DVec2 {
-        match self.even(depth, purpose) {
-            Some((place, key)) => {
-                let [x, y] = place.point2(key);
-                DVec2::new(fraction(x), fraction(y))
-            }
+        match self.even(depth, purpose, 0) {
+            Some([x, y]) => DVec2::new(x, y),
             None => {
                 let a = self.bits(depth, purpose);
                 DVec2::new(unit(a), unit(mix(a ^ 0x6a09_e667_f3bc_c908)))
@@ -169,8 +187,8 @@ impl Sampler {
     /// The `n`-th of any number of uniforms for a purpose, each as [`Sampler::u1`] gives one.
     #[inline]
     pub fn nth(&self, depth: u32, purpose: Purpose, n: u32) -> f64 {
-        match self.even(depth, purpose) {
-            Some((place, key)) => fraction(place.point1(combine(key, n.into()))),
+        match self.even(depth, purpose, n) {
+            Some([u]) => u,
             None => unit(combine(self.bits(depth, purpose), u64::from(n))),
         }
     }
