@@ -15,6 +15,8 @@ use std::sync::{Mutex, MutexGuard};
 const ONE: f64 = (1u128 << 64) as f64;
 /// Standard deviation and cut-off radius of the Gaussian reconstruction filter, pixels.
 const GAUSSIAN: (f64, f64) = (0.5, 1.5);
+/// How many pixels to each side it reaches.
+const REACH: usize = 2;
 
 type Pixel = [i128; 3];
 
@@ -51,6 +53,23 @@ struct Row {
     sums: Vec<Pixel>,
     /// The largest contributions to each; empty where they are not watched.
     largest: Vec<Largest>,
+}
+
+/// A sum of contributions to a pixel, before it is rounded.
+#[derive(Debug, Clone, Copy, Default)]
+struct Sum {
+    value: Spectrum,
+    /// The largest of them, where these are watched.
+    largest: Largest,
+}
+
+impl Sum {
+    fn add(&mut self, value: Spectrum, watched: bool) {
+        self.value += value;
+        if watched {
+            self.largest.add(value);
+        }
+    }
 }
 
 /// A sum of samples for every pixel.
@@ -137,83 +156,91 @@ impl Film {
         self.weight = weight;
     }
 
-    /// Adds the sum of a pixel's samples, each a raster position and a value, as [`Film::add`] does for one. The sum of
-    /// the samples in one pixel is rounded as a whole: the same samples must come together to give the same bits.
+    /// Adds the sum of a pixel's samples, each a raster position in the pixel and a value, as [`Film::add`] does for one. The
+    /// sum of the samples in one pixel is rounded as a whole: the same samples must come together to give the same bits.
     pub fn add_samples(&self, x: u32, y: u32, samples: impl Iterator<Item = (DVec2, Spectrum)>) {
-        match self.filter {
-            Filter::Box => {
-                let (mut sum, mut largest) = (Spectrum::ZERO, Largest::default());
-                for (_, value) in samples {
-                    if value.is_finite() {
-                        sum += value;
-                        if self.outliers {
-                            largest.add(value);
-                        }
-                    } else {
-                        self.dropped.fetch_add(1, Ordering::Relaxed);
+        let reach = match self.filter {
+            Filter::Box => 0,
+            Filter::Gaussian => REACH,
+        };
+        let side = 2 * reach + 1;
+        let mut around = vec![Sum::default(); side * side];
+        // Of a pixel from the square's corner: huge where it is to the left or above.
+        let from = |i: u32, middle: u32| (i as usize + reach).wrapping_sub(middle as usize);
+        for (raster, value) in samples {
+            if self.counts(value) {
+                self.spread(raster, |i, j, weight| match (from(i, x), from(j, y)) {
+                    (column, row) if column < side && row < side => {
+                        around[row * side + column].add(value * weight, self.outliers);
                     }
-                }
-                self.add_pixel(x, y, sum, &largest);
+                    _ => self.add_one(i, j, value * weight),
+                });
             }
-            Filter::Gaussian => samples.for_each(|(raster, value)| self.add(raster, value)),
+        }
+        for (n, sum) in around.iter().enumerate().filter(|(_, sum)| sum.value != Spectrum::ZERO) {
+            let (i, j) = (x as usize + n % side, y as usize + n / side);
+            self.add_pixel((i - reach) as u32, (j - reach) as u32, sum);
         }
     }
 
     /// Adds a value at a raster position in [0,width) x [0,height), through the reconstruction filter. From any thread.
     pub fn add(&self, raster: DVec2, value: Spectrum) {
-        if value == Spectrum::ZERO {
-            return;
-        }
-        if !value.is_finite() {
-            self.dropped.fetch_add(1, Ordering::Relaxed);
-            return;
-        }
-        match self.filter {
-            Filter::Box => self.add_one(raster.x as u32, raster.y as u32, value),
-            Filter::Gaussian => self.add_gaussian(raster, value),
+        if value != Spectrum::ZERO && self.counts(value) {
+            self.spread(raster, |x, y, weight| self.add_one(x, y, value * weight));
         }
     }
 
-    /// Spreads the value over the pixels around it; at the border the filter is cut and scaled up again.
-    fn add_gaussian(&self, raster: DVec2, value: Spectrum) {
+    /// Whether a value is finite; counts those that are not.
+    fn counts(&self, value: Spectrum) -> bool {
+        let finite = value.is_finite();
+        if !finite {
+            self.dropped.fetch_add(1, Ordering::Relaxed);
+        }
+        finite
+    }
+
+    /// The weights of the pixels around a raster position, of sum 1: at the border the Gaussian is cut and scaled up again.
+    #[inline(always)]
+    fn spread(&self, raster: DVec2, mut add: impl FnMut(u32, u32, f64)) {
+        if self.filter == Filter::Box {
+            return add(raster.x as u32, raster.y as u32, 1.0);
+        }
         let (sigma, radius) = GAUSSIAN;
         let axis = |at: f64, size: u32| {
             let first = (at - 0.5 - radius).ceil().max(0.0) as u32;
             let last = ((at - 0.5 + radius).floor() as u32).min(size - 1);
-            let weight = move |i: u32| {
+            let mut weights = [0.0; 2 * REACH];
+            for (weight, i) in weights.iter_mut().zip(first..=last) {
                 let d = (f64::from(i) + 0.5 - at) / sigma;
-                (-0.5 * d * d).exp()
-            };
-            let sum: f64 = (first..=last).map(weight).sum();
-            (first..=last).map(move |i| (i, weight(i) / sum))
-        };
-        for (y, wy) in axis(raster.y, self.height) {
-            for (x, wx) in axis(raster.x, self.width) {
-                self.add_one(x, y, value * (wx * wy));
+                *weight = (-0.5 * d * d).exp();
             }
+            let sum: f64 = weights.iter().sum();
+            (first..=last).zip(weights.map(|weight| weight / sum))
+        };
+        let columns = axis(raster.x, self.width);
+        for (y, wy) in axis(raster.y, self.height) {
+            columns.clone().for_each(|(x, wx)| add(x, y, wx * wy));
         }
     }
 
     /// Adds one contribution.
     fn add_one(&self, x: u32, y: u32, value: Spectrum) {
-        let mut largest = Largest::default();
-        if self.outliers {
-            largest.add(value);
-        }
-        self.add_pixel(x, y, value, &largest);
+        let mut sum = Sum::default();
+        sum.add(value, self.outliers);
+        self.add_pixel(x, y, &sum);
     }
 
-    /// Adds the sum of contributions, of which these are the largest.
-    fn add_pixel(&self, x: u32, y: u32, sum: Spectrum, largest: &Largest) {
+    /// Adds a sum of contributions.
+    fn add_pixel(&self, x: u32, y: u32, sum: &Sum) {
         let (x, y) = (x.min(self.width - 1) as usize, y.min(self.height - 1));
         let weight = f64::from(self.weight);
-        let fixed = sum.to_array().map(|v| (v * (ONE * weight)) as i128);
+        let fixed = sum.value.to_array().map(|v| (v * (ONE * weight)) as i128);
         let mut row = lock(&self.rows[y as usize]);
         for (sum, v) in row.sums[x].iter_mut().zip(fixed) {
             *sum = sum.saturating_add(v);
         }
         if let Some(pixel) = row.largest.get_mut(x) {
-            pixel.add_scaled(largest, weight);
+            pixel.add_scaled(&sum.largest, weight);
         }
     }
 
@@ -365,6 +392,29 @@ mod tests {
             film.add(raster, Spectrum::splat(2.0));
             let sum: f64 = film.image().pixels.iter().map(|p| f64::from(p.x)).sum();
             assert!((sum - 2.0).abs() < 1e-6, "{raster}: {sum}");
+        }
+    }
+
+    #[test]
+    fn a_pixels_samples_are_added_as_each_alone() {
+        let samples: Vec<(DVec2, Spectrum)> = (0..40)
+            .map(|i| f64::from(i) / 40.0)
+            .map(|u| (DVec2::new(u, (7.0 * u).fract()), Spectrum::new(u, 1.0 - u, 5.0 * u)))
+            .collect();
+        for (filter, x, y) in [Filter::Box, Filter::Gaussian]
+            .into_iter()
+            .flat_map(|filter| [(0, 0), (3, 2), (7, 5)].map(|(x, y)| (filter, x, y)))
+        {
+            let (together, alone) = (film(filter), film(filter));
+            let at = |offset: DVec2| DVec2::new(x.into(), y.into()) + offset;
+            together.add_samples(x, y, samples.iter().map(|&(offset, value)| (at(offset), value)));
+            samples.iter().for_each(|&(offset, value)| alone.add(at(offset), value));
+            for (a, b) in together.image().pixels.iter().zip(&alone.image().pixels) {
+                assert!(
+                    (*a - *b).abs().max_element() <= 1e-6 * b.max_element(),
+                    "{filter:?} ({x},{y}): {a} {b}"
+                );
+            }
         }
     }
 
