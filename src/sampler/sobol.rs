@@ -12,7 +12,7 @@ use super::counter::mix;
 pub const DIMENSIONS: usize = 5;
 
 /// Coefficients between the first and the last of a primitive polynomial over two elements, highest first, its degree and
-/// the first direction numbers, of the dimensions from the third on: as [Joe08] has them.
+/// the first direction numbers, of the dimensions from the third on: as \[Joe08\] has them.
 const POLYNOMIALS: [(u32, usize, [u32; 3]); DIMENSIONS - 2] =
     [(0b1, 2, [1, 3, 0]), (0b01, 3, [1, 3, 1]), (0b10, 3, [1, 1, 1])];
 
