@@ -263,7 +263,8 @@ fn the_numerics_of_the_roulette_agree() {
             integrator: Integrator::LvcHrr,
             seed,
             visibility: Backend::BEST,
-            iterations: 128,
+            // Squared weights leave rare bright samples: of few iterations, those that miss them seem too sure.
+            iterations: if changes.contains(&("mis", "power")) { 512 } else { 128 },
             samples: 8,
             max_depth: 8,
             ..scenes::settings()

@@ -30,15 +30,18 @@ fn difference(a: &Image, b: &Image) -> f64 {
 #[test]
 fn images_of_two_seeds_differ_less_and_the_plain_one_is_what_it_was() {
     let scene = scenes::load("glass_caustic", &[("film.width", "64"), ("film.height", "48")]);
-    let runs = [1, 2].map(|seed| rejecting(Integrator::Pt, 32, seed)).map(|settings| {
+    // Bright samples are rare: one or two of eight renders have one.
+    let runs = [1, 2, 3, 4, 5, 6, 7, 8].map(|seed| rejecting(Integrator::Pt, 32, seed)).map(|settings| {
         let with = run(&scene, settings.clone());
         let without = run(&scene, Settings { outlier_rejection: Switch::Off, ..settings });
         assert!(with.film.image() == without.film.image() && without.image() == without.film.image());
         assert!(with.stats.biased && !without.stats.biased);
         with
     });
-    let plain = difference(&runs[0].film.image(), &runs[1].film.image());
-    let rejected = difference(&runs[0].image(), &runs[1].image());
+    let of_pairs = |image: &dyn Fn(&Outcome) -> Image| -> f64 {
+        runs.chunks(2).map(|pair| difference(&image(&pair[0]), &image(&pair[1]))).sum::<f64>() / 4.0
+    };
+    let (plain, rejected) = (of_pairs(&|run| run.film.image()), of_pairs(&Outcome::image));
     println!("mean square difference of two seeds: {plain}, without outliers {rejected}");
     assert!(rejected < 1e-3 * plain, "{rejected} {plain}");
 }

@@ -112,7 +112,7 @@ const EVEN_DEPTHS: u32 = 3;
 
 /// Subpaths whose numbers are spread evenly over them all: the samples of a pixel, the light subpaths of an iteration.
 /// Those that choose positions, directions and lights near a subpath's start are points of one sequence
-/// ([`super::sobol`]), which lowers the family's noise; each subpath's own are as uniform and independent as ever.
+/// (`sobol.rs`), which lowers the family's noise; each subpath's own are as uniform and independent as ever.
 #[derive(Debug, Clone, Copy)]
 pub struct Family(u64);
 
@@ -225,6 +225,33 @@ mod tests {
             };
             let full = (0..20).filter(|&family| hit(family) == 64).count();
             assert_eq!(full, if even { 20 } else { 0 }, "{depth} {purpose:?}");
+        }
+    }
+
+    /// Decisions that belong together are coordinates of one point: those of either light, and those that survive, are
+    /// spread evenly as well.
+    #[test]
+    fn halves_of_a_family_are_spread_evenly() {
+        use Purpose::*;
+        for (half, square, even) in [
+            (Survival, Direction, true),
+            (Lobe, Direction, true),
+            (LightPick, LightPoint, true),
+            (Lobe, LightPoint, false),
+        ] {
+            let full = |family: u64| {
+                let mut seen = [false; 16];
+                for index in 0..64 {
+                    let sampler = Family::new(5, 1, Stream::Eye, family).member(index);
+                    if sampler.u1(1, half) < 0.5 {
+                        let u = sampler.u2(1, square);
+                        seen[(u.x * 4.0) as usize * 4 + (u.y * 4.0) as usize] = true;
+                    }
+                }
+                seen.iter().all(|&s| s)
+            };
+            let full = (0..40).filter(|&family| full(family)).count();
+            assert_eq!(full == 40, even, "{half:?} {square:?}: {full} of 40");
         }
     }
 

@@ -1,6 +1,6 @@
 //! Random numbers that depend on what they are for, never on who asked first.
 
 pub mod counter;
-pub mod sobol;
+mod sobol;
 
 pub use counter::{Family, Purpose, Sampler, Stream};

@@ -9,7 +9,7 @@
 use super::counter::mix;
 
 /// Dimensions of a point.
-pub const DIMENSIONS: usize = 5;
+const DIMENSIONS: usize = 5;
 
 /// Coefficients between the first and the last of a primitive polynomial over two elements, highest first, its degree and
 /// the first direction numbers, of the dimensions from the third on: as \[Joe08\] has them.
