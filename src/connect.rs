@@ -100,7 +100,11 @@ impl EyeVertex {
         }
         let back = -walk.to_previous();
         let m = techniques.connection(&self.lobes, back);
-        Onward::Vertex(Self::new(techniques, walk, m, techniques.direct(&self.lobes, Some(back)), shown))
+        let m_emitter = world.lights.at(&walk.vertex.point).map_or(0.0, |emitter| {
+            let preference = world.lights.preference(|| self.walk.vertex.place(), emitter.emitter);
+            techniques.direct(&self.lobes, Some(back), preference)
+        });
+        Onward::Vertex(Self::new(techniques, walk, m, m_emitter, shown))
     }
 
     /// What a segment that leaves the scene finds.
@@ -114,7 +118,11 @@ impl EyeVertex {
         }
         let total = start.total.given(rules.heuristic, &rules.storing, Origin::Lamp);
         let side = rules.heuristic.arrive(start.pdf_w, 1.0, start.cos, 1.0, total);
-        let m_next_event = if segment.delta { 0.0 } else { techniques.next_event };
+        let m_next_event = if segment.delta {
+            0.0
+        } else {
+            techniques.next_event * world.lights.preference(|| self.walk.vertex.place(), light.number())
+        };
         let back = techniques.emission_pdf(world, &light, sky.direction, start.origin);
         let e = rules.heuristic.others(sky.pdf, rules.heuristic.total(&side, m_next_event, back, 0.0));
         Onward::Sky(segment.throughput * sky.radiance * rules.heuristic.weight(0.0, m_0, e))
@@ -171,10 +179,10 @@ impl EyeVertex {
         sampler: &Sampler,
     ) -> Option<(Spectrum, Ray)> {
         let depth = self.walk.depth;
-        let light = world
-            .lights
-            .sample(sampler.u1(depth, Purpose::LightPick), sampler.u2(depth, Purpose::LightPoint))?;
-        self.direct(world, techniques, &light, techniques.next_event, 1.0)
+        let (pick, u) = (sampler.u1(depth, Purpose::LightPick), sampler.u2(depth, Purpose::LightPoint));
+        let (number, preference) = world.lights.choose_for(|| self.walk.vertex.place(), pick)?;
+        let (light, m) = (world.lights.point_on(number, u), techniques.next_event * preference);
+        self.direct(world, techniques, &light, m, preference, preference)
     }
 
     /// Technique s = 1 by the roulette over points of lights: from one that it kept. `tries`: how many points it judged,
@@ -188,7 +196,8 @@ impl EyeVertex {
     ) -> Option<(Spectrum, Ray)> {
         let offset = light.position()? - self.walk.vertex.point.position;
         let m = techniques.emitter_points(&self.lobes, Some(offset));
-        self.direct(world, techniques, light, m, tries)
+        let preference = world.lights.preference(|| self.walk.vertex.place(), light.number());
+        self.direct(world, techniques, light, m, tries, preference)
     }
 
     /// Light straight from a point of a light, by the technique that has the part `m` of m_1 and tries so often.
@@ -199,6 +208,7 @@ impl EyeVertex {
         light: &LightPoint,
         m: f64,
         tries: f64,
+        preference: f64,
     ) -> Option<(Spectrum, Ray)> {
         let vertex = &self.walk.vertex;
         let Toward { w, distance2, cos: cos_light, radiance } = light.toward(vertex.point.position)?;
@@ -212,7 +222,7 @@ impl EyeVertex {
         }
         let heuristic = techniques.heuristic;
         let offset = light.position().map(|position| position - vertex.point.position);
-        let all = techniques.direct(&self.lobes, offset);
+        let all = techniques.direct(&self.lobes, offset, preference);
         let l = per_area(pdf_w, cos_light, distance2) * techniques.eye_hits(light) / light.pdf();
         let emission = techniques.emission_pdf(world, light, -w, vertex.point.position);
         let density = per_area(emission, vertex.cos_ng(w), distance2);

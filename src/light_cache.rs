@@ -17,11 +17,15 @@ struct Record {
     wo: Vec3,
     distance: f32,
     throughput: Vec3,
-    depth: u32,
-    after_delta: bool,
-    from_afar: bool,
-    origins: [Origin; 2],
+    came: Came,
     side: Side,
+}
+
+/// How the subpath came to the vertex: what of a [`Walk`] is not the same for all first vertices, or for all others.
+#[derive(Debug, Clone, Copy)]
+enum Came {
+    FromLight { from_afar: bool, preference: f32 },
+    FromSurface { depth: u32, after_delta: bool, origins: [Origin; 2] },
 }
 
 const _: () = assert!(size_of::<Record>() == 64);
@@ -60,10 +64,12 @@ impl LightCache {
             wo: light.vertex.wo.as_vec3(),
             distance: light.distance as f32,
             throughput: light.throughput.as_vec3(),
-            depth: light.depth,
-            after_delta: light.after_delta,
-            from_afar: light.from_afar,
-            origins: light.origins,
+            came: match *light {
+                Walk { depth: 1, from_afar, preference, .. } => {
+                    Came::FromLight { from_afar, preference: preference as f32 }
+                }
+                Walk { depth, after_delta, origins, .. } => Came::FromSurface { depth, after_delta, origins },
+            },
             side: light.side,
         });
     }
@@ -119,7 +125,10 @@ impl LightCache {
 
     /// Segments between a vertex and its light.
     pub fn depth(&self, index: usize) -> u32 {
-        self.records[index].depth
+        match self.records[index].came {
+            Came::FromLight { .. } => 1,
+            Came::FromSurface { depth, .. } => depth,
+        }
     }
 
     /// A vertex, ready to be connected to. Its position is the stored one, to the bit.
@@ -128,16 +137,23 @@ impl LightCache {
         let [u, v] = r.barycentric.map(f64::from);
         let mut point = SurfacePoint::at_barycentric(&world.scene.mesh, r.triangle, u, v);
         point.position = self.positions[index].as_dvec3();
-        Walk {
+        let walk = Walk {
             vertex: Vertex::new(world, point, r.wo.as_dvec3().normalize()),
             throughput: Spectrum::from(r.throughput),
             side: r.side,
             b_as_lamp: r.side.b,
             distance: f64::from(r.distance),
-            depth: r.depth,
-            after_delta: r.after_delta,
-            from_afar: r.from_afar,
-            origins: r.origins,
+            depth: 1,
+            after_delta: false,
+            from_afar: false,
+            preference: 1.0,
+            origins: [Origin::Lamp; 2],
+        };
+        match r.came {
+            Came::FromLight { from_afar, preference } => {
+                Walk { from_afar, preference: preference.into(), ..walk }
+            }
+            Came::FromSurface { depth, after_delta, origins } => Walk { depth, after_delta, origins, ..walk },
         }
     }
 

@@ -237,9 +237,9 @@ impl Techniques {
         }
     }
 
-    /// m_1, likewise.
-    pub fn direct(&self, lobes: &Lobes, offset: Option<DVec3>) -> f64 {
-        self.next_event + self.emitter_points(lobes, offset)
+    /// m_1, likewise. `preference`: [`Lights::preference`](crate::light::Lights::preference) of the light there.
+    pub fn direct(&self, lobes: &Lobes, offset: Option<DVec3>, preference: f64) -> f64 {
+        self.next_event * preference + self.emitter_points(lobes, offset)
     }
 
     /// m_s of an edge between two surfaces, neither of them delta: where the roulette is off, and, over the probability
@@ -277,9 +277,10 @@ impl Techniques {
         }
         if light.depth == 1 {
             if self.emitters.is_none() || light.from_afar {
-                return self.next_event;
+                return self.next_event * light.preference;
             }
-            return self.direct(&self.lobes(&light.vertex, w_eye), Some(light.to_previous()));
+            let lobes = self.lobes(&light.vertex, w_eye);
+            return self.direct(&lobes, Some(light.to_previous()), light.preference);
         }
         if self.roulette.is_none() {
             return self.base;

@@ -9,7 +9,7 @@ use hrr::light::LightSource;
 use hrr::material::Material;
 use hrr::math::Spectrum;
 use hrr::scene::Scene;
-use hrr::settings::{AutoSwitch, Backend, Heuristic, Integrator, Settings};
+use hrr::settings::{AutoSwitch, Backend, Heuristic, Integrator, LightChoice, Settings};
 use hrr::subpath::World;
 use std::time::{Duration, Instant};
 
@@ -251,6 +251,47 @@ fn emitter_vertices_keep_the_mean() {
             let with = hrr(on, mis, 8, seed);
             with.assert_agrees(&without, 0.02, &format!("{name}, on and off, {mis}"));
         }
+    }
+}
+
+/// Lamps chosen by place and by power, by integrators that share little code; with lights of other kinds as well.
+#[test]
+fn the_choice_of_lights_keeps_the_mean() {
+    let mut every = scenes::lamps_in_booths();
+    every.lights = scenes::lights_of_every_kind();
+    for (i, (name, scene)) in
+        [("booths", scenes::lamps_in_booths()), ("every light", every)].iter().enumerate()
+    {
+        let run = |integrator, light_choice, seed| {
+            let (seed, visibility) = (10 * i as u64 + seed, Backend::BEST);
+            let emitters = if seed % 2 == 0 { AutoSwitch::On } else { AutoSwitch::Off };
+            let sizes = Settings { iterations: 96, samples: 12, max_depth: 8, ..scenes::settings() };
+            estimate(scene, &Settings { integrator, light_choice, emitters, seed, visibility, ..sizes }, 8)
+        };
+        let pt = run(Integrator::Pt, LightChoice::Power, 1);
+        for (seed, integrator) in
+            [(2, Integrator::Pt), (3, Integrator::Bpt), (4, Integrator::LvcHrr), (5, Integrator::Lvc)]
+        {
+            let by_place = run(integrator, LightChoice::Place, seed);
+            by_place.assert_agrees(&pt, 0.02, &format!("{name}, {integrator} by place"));
+        }
+    }
+}
+
+/// Where lamps are far apart, places choose by themselves; not where one is as good as another everywhere.
+#[test]
+fn lights_are_chosen_by_place_where_that_pays() {
+    let image = |scene: &Scene, light_choice| {
+        let sizes = Settings { iterations: 2, samples: 2, ..scenes::settings() };
+        estimate(scene, &Settings { light_choice, integrator: Integrator::Pt, ..sizes }, 8).mean
+    };
+    for (scene, like, unlike) in [
+        (scenes::lamps_in_booths(), LightChoice::Place, LightChoice::Power),
+        (scenes::lamps_over_a_glossy_floor(2), LightChoice::Power, LightChoice::Place),
+    ] {
+        let auto = image(&scene, LightChoice::Auto);
+        assert_eq!(auto, image(&scene, like));
+        assert_ne!(auto, image(&scene, unlike));
     }
 }
 

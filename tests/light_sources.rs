@@ -4,15 +4,17 @@
 use crate::support::Random;
 use crate::support::chart::{Disc, Sphere};
 use crate::support::distribution::Distribution;
+use crate::support::scenes;
 use crate::support::stats::{Family, Moments};
 use glam::{DVec2, DVec3, Vec3};
 use hrr::geometry::Mesh;
 use hrr::image::Image;
 use hrr::light::distant::Surroundings;
 use hrr::light::lamp::{Cone, Lamp};
-use hrr::light::{Environment, LightPoint, LightSource, Lights};
+use hrr::light::{Environment, LightPoint, LightSource, Lights, Place};
 use hrr::material::Material;
 use hrr::math::{Frame, Spectrum, luminance};
+use hrr::settings::LightChoice;
 use std::f64::consts::{PI, TAU};
 use std::sync::Arc;
 
@@ -183,4 +185,65 @@ fn emission_carries_the_power_of_every_light() {
         });
     }
     family.assert();
+}
+
+/// Next-event estimation chooses each light as often as it says, wherever that is, and none that may bring light never.
+#[test]
+fn lights_are_chosen_for_a_place_as_often_as_they_say() {
+    let mut scene = scenes::lamps_in_booths();
+    scene.lights = scenes::lights_of_every_kind();
+    let lights =
+        Lights::new(&scene.mesh, &scene.materials, &scene.lights).chosen_by(LightChoice::Place, &scene.mesh);
+    let mut rng = Random::new(85);
+    let mut by_power: Vec<f64> = (0..lights.len() as u32)
+        .map(|number| match lights.point_on(number, rng.u2()) {
+            LightPoint::Surface(e) => e.pdf_a * scene.mesh.area(e.point.triangle),
+            LightPoint::Lamp(l) => l.probability,
+            LightPoint::Distant(d) => {
+                if d.delta {
+                    d.pdf
+                } else {
+                    0.0
+                }
+            }
+        })
+        .collect();
+    // The sky's density is that of its directions as well.
+    *by_power.last_mut().unwrap() = 1.0 - by_power.iter().sum::<f64>();
+    let lamp = Vec3::new(-0.5, 0.45, -0.05).as_dvec3();
+    let places = [
+        (DVec3::new(-1.2, 0.0, 0.0), DVec3::Y, false),
+        (DVec3::new(0.6, 0.0, 0.1), -DVec3::Y, false),
+        (DVec3::new(0.6, 0.0, 0.1), -DVec3::Y, true),
+        // In a lamp, in a lamp without size, and so near and so far that squares are no numbers.
+        (lamp, DVec3::X, false),
+        (DVec3::new(0.6, 0.3, 0.4) - scene.mesh.origin, DVec3::Y, false),
+        (lamp + DVec3::splat(1e-170), DVec3::Y, true),
+        (DVec3::splat(1e200), DVec3::Z, false),
+        (DVec3::splat(1e-200), DVec3::Z, true),
+    ];
+    let mut family = Family::default();
+    for (i, (position, normal, passes)) in places.into_iter().enumerate() {
+        let place = || Place { position, normal, passes };
+        let mut seen = vec![Moments::default(); lights.len()];
+        for _ in 0..20_000 {
+            let (number, preference) = lights.choose_for(place, rng.u1()).unwrap();
+            assert_eq!(preference, lights.preference(place, number));
+            seen.iter_mut().enumerate().for_each(|(n, m)| m.push(f64::from(n as u32 == number)));
+        }
+        let mut total = 0.0;
+        for (number, (moments, by_power)) in seen.iter().zip(&by_power).enumerate() {
+            let preference = lights.preference(place, number as u32);
+            assert!(preference >= 0.3 - 1e-12 && preference.is_finite(), "place {i}: {preference}");
+            total += preference * by_power;
+            let p = preference * by_power;
+            family.add(format!("place {i}, light {number}: {p}"), moments.z_test(p, 0.0));
+        }
+        assert!((total - 1.0).abs() < 1e-12, "place {i}: {total}");
+    }
+    family.assert();
+    // The lamp above is asked most often.
+    let under = |x: f64| Place { position: DVec3::new(x, 0.0, 0.0), normal: DVec3::Y, passes: false };
+    let of = |number: u32, x: f64| lights.preference(|| under(x), number);
+    assert!(of(0, -1.1) > 2.0 * of(8, -1.1) && of(8, 1.3) > 2.0 * of(0, 1.3));
 }

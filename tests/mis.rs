@@ -13,7 +13,7 @@ use hrr::mis::Heuristic;
 use hrr::roulette::{Range, probability};
 use hrr::sampler::{Purpose, Sampler, Stream};
 use hrr::scene::Scene;
-use hrr::settings::{Backend, Settings};
+use hrr::settings::{Backend, LightChoice, Settings};
 use hrr::subpath::walk::Start;
 use hrr::subpath::{Origin, Role, Storing, Total, Vertex, Walk, World};
 use hrr::techniques::{EmitterRoulette, Merging, Numerics, Roulette, Techniques};
@@ -95,7 +95,8 @@ impl Path {
     }
 
     /// m_1 of next-event estimation and of the roulette over points of lights.
-    fn direct(&self, t: &Techniques) -> [f64; 2] {
+    fn direct(&self, world: &World<'_>, t: &Techniques) -> [f64; 2] {
+        let preference = world.lights.preference(|| self.surfaces[0].place(), self.light.number());
         let by_roulette = match (&t.emitters, &self.light) {
             (None, _) | (_, LightPoint::Distant(_)) => 0.0,
             (Some(e), _) => {
@@ -105,7 +106,7 @@ impl Path {
                 1.0 / (1.0 / (e.points * p) + (e.samples - 1.0) / e.points)
             }
         };
-        [t.next_event, by_roulette]
+        [t.next_event * preference, by_roulette]
     }
 
     /// Densities, up to a common factor, of all techniques s = 0 .. k-1, and of merging at x_0 .. x_{k-1}.
@@ -144,7 +145,7 @@ impl Path {
                 return 0.0;
             }
             if s == 1 {
-                return self.direct(t).iter().sum();
+                return self.direct(world, t).iter().sum();
             }
             if s == k - 1 {
                 return t.light_image * has(Role::Seen, s - 1);
@@ -241,18 +242,20 @@ fn close(what: &str, by_recursion: f64, by_definition: f64) {
 fn recursion_equals_the_definition() {
     let scene = scenes::box_of_everything();
     for heuristic in Heuristic::ALL {
-        check_guided(&scene, heuristic);
+        check_guided(&scene, heuristic, LightChoice::Power);
     }
 }
 
 /// Lamps without size, a sun and a sky beside the emitting triangles, seen through a lens; the box has no front, where
-/// these come in.
+/// these come in. They are chosen by place.
 #[test]
 fn recursion_equals_the_definition_with_lights_of_every_kind() {
     let mut scene = scenes::box_of_everything();
     scene.lights = scenes::lights_of_every_kind();
     (scene.camera.aperture_radius, scene.camera.focus_distance) = (0.2, 2.0);
-    check_guided(&scene, Heuristic::Balance);
+    for heuristic in Heuristic::ALL {
+        check_guided(&scene, heuristic, LightChoice::Place);
+    }
 }
 
 /// Roughness that varies decides what is stored; a smooth coat is left out, as these paths know delta vertices only.
@@ -260,7 +263,7 @@ fn recursion_equals_the_definition_with_lights_of_every_kind() {
 fn recursion_equals_the_definition_with_textures() {
     let mut scene = scenes::box_of_textures();
     scene.materials[0] = scenes::box_of_everything().materials[7].clone();
-    check_guided(&scene, Heuristic::Balance);
+    check_guided(&scene, Heuristic::Balance, LightChoice::Power);
 }
 
 #[test]
@@ -275,12 +278,12 @@ fn recursion_equals_the_definition_with_other_numerics() {
         Numerics { widening: 0.0, floor: 0.1, ..default },
     ] {
         let roulette = TECHNIQUES.roulette.map(|roulette| Roulette { numerics, ..roulette });
-        check(&world, &Techniques { roulette, ..TECHNIQUES });
+        assert_eq!(check(&world, &Techniques { roulette, ..TECHNIQUES }), 0);
     }
 }
 
-fn check_guided(scene: &Scene, heuristic: Heuristic) {
-    let settings = Settings { visibility: Backend::Obvhs, ..scenes::settings() };
+fn check_guided(scene: &Scene, heuristic: Heuristic, light_choice: LightChoice) {
+    let settings = Settings { visibility: Backend::Obvhs, light_choice, ..scenes::settings() };
     let world = World::new(scene, &settings).unwrap();
     // Light that goes to one side is useful, and more so the farther.
     let observations = (1..1000).map(|i| {
@@ -292,14 +295,17 @@ fn check_guided(scene: &Scene, heuristic: Heuristic) {
     for guide in [None, guide] {
         for (lamps, shown_only) in [(false, false), (true, false), (false, true)] {
             let storing = Storing { lamps, shown_only, ..TECHNIQUES.storing };
-            check(&world, &Techniques { heuristic, guide: guide.clone(), storing, ..TECHNIQUES });
+            let t = Techniques { heuristic, guide: guide.clone(), storing, ..TECHNIQUES };
+            let preferred = check(&world, &t);
+            assert_eq!(preferred >= 100, light_choice == LightChoice::Place, "{preferred}");
         }
     }
 }
 
-fn check(world: &World<'_>, t: &Techniques) {
+/// The number of lights that were chosen with another probability than by power.
+fn check(world: &World<'_>, t: &Techniques) -> usize {
     let mut checked = [0usize; 7];
-    let mut with_delta = 0;
+    let (mut with_delta, mut preferred) = (0, 0);
     // Few are merged that smooth surfaces show.
     let paths: u64 = if t.storing.shown_only { 80_000 } else { 16_000 };
     for index in 0..paths {
@@ -351,29 +357,27 @@ fn check(world: &World<'_>, t: &Techniques) {
             let delta = last.walk.vertex.bsdf.is_delta();
             if let Some((value, _)) = last.next_event(world, t, &eye_sampler).filter(|_| !delta) {
                 let depth = last.walk.depth;
-                let light = world
-                    .lights
-                    .sample(
-                        eye_sampler.u1(depth, Purpose::LightPick),
-                        eye_sampler.u2(depth, Purpose::LightPoint),
-                    )
-                    .unwrap();
+                let pick = eye_sampler.u1(depth, Purpose::LightPick);
+                let (number, preference) =
+                    world.lights.choose_for(|| last.walk.vertex.place(), pick).unwrap();
+                let light = world.lights.point_on(number, eye_sampler.u2(depth, Purpose::LightPoint));
+                preferred += usize::from(preference != 1.0);
                 let path = path(light, &[], &eyes);
                 let x = &last.walk.vertex;
                 let w = path.to(1, 0);
                 let plain = last.walk.throughput
                     * x.factor(x.wo, w)
                     * light.toward(x.point.position).unwrap().radiance
-                    * (x.cos_ng(w) * path.g(1, 0) / light.pdf());
+                    * (x.cos_ng(w) * path.g(1, 0) / (preference * light.pdf()));
                 let weight = path.weight(world, t, 0, 1);
-                let [by_nee, by_roulette] =
-                    path.direct(t).map(|m| m * weight / path.direct(t).iter().sum::<f64>());
+                let [nee, roulette] = path.direct(world, t);
+                let [by_nee, by_roulette] = [nee, roulette].map(|m| m * weight / (nee + roulette));
                 close("s = 1", value.x / plain.x, by_nee);
                 count(1, &path);
                 // The same by the roulette over points of lights, where that plays.
                 match last.emitter_point(world, t, &light, 1.0) {
                     Some((value, _)) => {
-                        close("emitter point", value.x / plain.x, by_roulette);
+                        close("emitter point", value.x / (plain.x * preference), by_roulette);
                         count(5, &path);
                     }
                     None => assert_eq!(by_roulette, 0.0),
@@ -438,4 +442,5 @@ fn check(world: &World<'_>, t: &Techniques) {
     println!("paths checked by kind of technique {checked:?}, with delta vertices {with_delta}");
     let kinds = if world.lights.only_area() { 0..6 } else { 0..7 };
     assert!(checked[kinds].iter().all(|&n| n >= 100) && with_delta >= 100, "{checked:?} {with_delta}");
+    preferred
 }

@@ -1,8 +1,8 @@
 //! The settings table, the struct behind it and its TOML are one thing.
 
 use hrr::settings::{
-    AutoSwitch, Backend, EmbreeBuild, Heuristic, Integrator, Kind, LobePrecision, MinimumRule, Range,
-    Setting, Settings, Switch, TABLE,
+    AutoSwitch, Backend, EmbreeBuild, Heuristic, Integrator, Kind, LightChoice, LobePrecision, MinimumRule,
+    Range, Setting, Settings, Switch, TABLE,
 };
 
 /// A value of each setting that is not its default. A new setting has no entry here yet: the tests say so.
@@ -27,6 +27,7 @@ fn other_value(name: &str) -> &'static str {
         "embree_robust" => "off",
         "embree_build" => "low",
         "storing" => "0.5",
+        "light_choice" => "place",
         "guiding" => "off",
         "mis" => "power",
         "reused_subpaths" => "50",
@@ -89,6 +90,7 @@ fn every_field_has_its_row() {
         embree_build,
         storing,
         emitters,
+        light_choice,
         guiding,
         adaptive,
         outlier_rejection,
@@ -109,7 +111,8 @@ fn every_field_has_its_row() {
     assert_eq!((node_padding, embree_robust, embree_build), (8.0, Switch::Off, EmbreeBuild::Low));
     assert_eq!((merge_radius, merge_pixels, merge_shrink), (0.5, 5.0, 1.0));
     assert_eq!((reused_subpaths, record_spacing), (50, 4));
-    assert_eq!((storing, guiding, adaptive, TABLE.len()), (0.5, AutoSwitch::Off, Switch::Off, 37));
+    assert_eq!((light_choice, TABLE.len()), (LightChoice::Place, 38));
+    assert_eq!((storing, guiding, adaptive), (0.5, AutoSwitch::Off, Switch::Off));
     assert_eq!(outlier_rejection, Switch::On);
     assert_eq!((axis_probability, emitters), (Some(2.5), AutoSwitch::On));
     assert_eq!((with.to_string(), without.to_string()), ("sds".into(), "caustics,lens".into()));

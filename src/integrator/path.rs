@@ -8,6 +8,7 @@ use super::{Integrator, Size};
 use crate::bsdf::Transport;
 use crate::error::Result;
 use crate::film::Film;
+use crate::light::{LightPoint, Place};
 use crate::math::Spectrum;
 use crate::mis::EYE_HITS;
 use crate::sampler::{Purpose, Sampler};
@@ -38,20 +39,25 @@ impl<'a> PathTracer<'a> {
         let mut direction = world.camera.direction_from(origin, sample.raster);
         let mut ray = offset::from_free_point(origin, direction);
         let (mut sum, mut throughput) = (Spectrum::ZERO, Spectrum::ONE);
-        // Density of the last direction, as it counts for weights; `None` when next-event estimation could not have found what it hits.
-        let mut pdf_direction = None;
+        // Density of the last direction, as it counts for weights, and where it came from; `None` when next-event estimation could
+        // not have found what it hits.
+        let mut scattered_at: Option<(f64, Place)> = None;
         for depth in 1..=self.settings.max_depth {
             let Some(point) = world.intersect(&ray, origin, direction) else {
                 if LIGHTS && let Some(sky) = world.lights.sky(direction) {
-                    let weight = pdf_direction.map_or(1.0, |hits: f64| hits / (hits + sky.pdf));
+                    let number = LightPoint::Distant(sky).number();
+                    let weight = scattered_at.map_or(1.0, |(hits, place)| {
+                        hits / (hits + sky.pdf * world.lights.preference(|| place, number))
+                    });
                     sum += throughput * sky.radiance * weight;
                 }
                 break;
             };
             if let Some(emitter) = world.lights.at(&point) {
-                let weight = pdf_direction.map_or(1.0, |hits: f64| {
+                let weight = scattered_at.map_or(1.0, |(hits, place)| {
                     let distance2 = (point.position - origin).length_squared();
-                    let pdf_light = emitter.pdf_a * distance2 / point.ng.dot(direction).abs();
+                    let pdf_a = emitter.pdf_a * world.lights.preference(|| place, emitter.emitter);
+                    let pdf_light = pdf_a * distance2 / point.ng.dot(direction).abs();
                     hits / (hits + pdf_light)
                 });
                 sum += throughput * emitter.radiance(-direction) * weight;
@@ -79,7 +85,7 @@ impl<'a> PathTracer<'a> {
             }
             let Some((next_ray, s)) = next else { break };
             throughput *= s.weight;
-            pdf_direction = (!s.delta).then_some(EYE_HITS * s.pdf);
+            scattered_at = (!s.delta).then(|| (EYE_HITS * s.pdf, vertex.place()));
             (ray, origin, direction) = (next_ray, point.position, s.wi);
         }
         sum
@@ -89,7 +95,9 @@ impl<'a> PathTracer<'a> {
     /// free.
     fn direct(&self, vertex: &Vertex, sampler: &Sampler, depth: u32) -> Option<(Spectrum, Ray)> {
         let (pick, u) = (sampler.u1(depth, Purpose::LightPick), sampler.u2(depth, Purpose::LightPoint));
-        let emitter = self.world.lights.area.sample_point(pick, u)?;
+        let lights = &self.world.lights;
+        let (number, preference) = lights.choose_for(|| vertex.place(), pick)?;
+        let emitter = lights.area.point_on(number, u);
         let to = emitter.point.position - vertex.point.position;
         let distance2 = to.length_squared();
         let wi = to * (1.0 / distance2.sqrt());
@@ -103,19 +111,22 @@ impl<'a> PathTracer<'a> {
         }
         // Over the sum of both densities, as they count; that of the emitter, seen from here, is pdf_a distance^2 / cos.
         let cos = emitter.point.ng.dot(wi).abs();
-        let value = scattered * radiance * (cos / (emitter.pdf_a * distance2 + EYE_HITS * pdf_w * cos));
+        let pdf_a = emitter.pdf_a * preference;
+        let value = scattered * radiance * (cos / (pdf_a * distance2 + EYE_HITS * pdf_w * cos));
         Some((value, offset::between(&vertex.point, &emitter.point)))
     }
 
     /// As [`PathTracer::direct`], from lights of all kinds.
     fn direct_of_any(&self, vertex: &Vertex, sampler: &Sampler, depth: u32) -> Option<(Spectrum, Ray)> {
         let (pick, u) = (sampler.u1(depth, Purpose::LightPick), sampler.u2(depth, Purpose::LightPoint));
-        let light = self.world.lights.sample(pick, u)?;
+        let (number, preference) = self.world.lights.choose_for(|| vertex.place(), pick)?;
+        let light = self.world.lights.point_on(number, u);
         let to = light.toward(vertex.point.position)?;
         let (scattered, pdf_w) = vertex.toward_light(to.w);
         // Scattering by chance meets surfaces and the sky only.
         let hits = if light.is_delta() { 0.0 } else { EYE_HITS * pdf_w };
-        let value = scattered * to.radiance * (to.cos / (light.pdf() * to.distance2 + hits * to.cos));
+        let value =
+            scattered * to.radiance * (to.cos / (preference * light.pdf() * to.distance2 + hits * to.cos));
         (value != Spectrum::ZERO).then(|| (value, offset::to_light(&vertex.point, &light)))
     }
 }

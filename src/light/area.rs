@@ -1,11 +1,13 @@
 //! Emitting triangles: a point is picked with probability proportional to power, uniformly over the area; directions
 //! follow the cosine law. Next-event estimation and emission use the same density of points.
 
+use super::choice::{Group, Shape};
 use super::joined;
 use crate::geometry::{Mesh, SurfacePoint};
 use crate::material::Material;
 use crate::math::{Discrete, Frame, Spectrum, luminance, warp};
 use glam::{DVec2, DVec3};
+use std::collections::BTreeMap;
 use std::f64::consts::PI;
 use std::sync::Arc;
 
@@ -121,6 +123,35 @@ impl AreaLights {
         self.emitters.iter_mut().for_each(|e| e.pdf_a *= share);
     }
 
+    /// Their lamps; triangles that touch are one. `share`: theirs of light picks.
+    pub(super) fn groups(&self, share: f64) -> Vec<Group> {
+        let first = joined::lamps(self.emitters.iter().map(|e| e.corners));
+        let mut lamps: BTreeMap<usize, Vec<u32>> = BTreeMap::new();
+        for (i, lamp) in first.into_iter().enumerate() {
+            lamps.entry(lamp).or_default().push(i as u32);
+        }
+        lamps
+            .into_values()
+            .filter_map(|lights| {
+                let emitters = || lights.iter().map(|&i| &self.emitters[i as usize]);
+                let pick = Discrete::new(lights.iter().map(|&i| self.pick.probability(i as usize)))?;
+                let corners = || emitters().flat_map(|e| e.corners);
+                let (low, high) = corners().fold((DVec3::MAX, DVec3::MIN), |(l, h), c| (l.min(c), h.max(c)));
+                let center = 0.5 * (low + high);
+                let radius = corners().map(|c| (c - center).length()).fold(0.0, f64::max);
+                let axis = emitters().map(|e| e.ng).sum::<DVec3>().normalize_or(DVec3::Z);
+                let cos = emitters().map(|e| e.ng.dot(axis)).fold(1.0, f64::min);
+                // Triangles in a plane are one, whatever the roundings.
+                let spread = if cos > 1.0 - 1e-6 { 0.0 } else { (1.0 - cos.max(0.0).powi(2)).sqrt() };
+                let by_power = pick.total() * share;
+                let two_sided = emitters().any(|e| e.two_sided);
+                let intensity = pick.total() * self.power() / (PI * if two_sided { 2.0 } else { 1.0 });
+                let shape = Shape::Area { center, radius, axis, spread, two_sided, intensity };
+                Some(Group { lights, pick, by_power, shape })
+            })
+            .collect()
+    }
+
     /// The sum of the squares of their lamps' shares of the light; triangles that touch are one lamp.
     pub(super) fn concentration(&self) -> f64 {
         let mut shares = vec![0.0; self.emitters.len()];
@@ -144,11 +175,19 @@ impl AreaLights {
     /// A point on some emitter, `None` when there is none. `pick` and `u` are uniform in [0,1).
     #[inline(always)]
     pub fn sample_point(&self, pick: f64, u: DVec2) -> Option<EmitterPoint> {
-        if self.emitters.is_empty() {
-            return None;
-        }
-        let index = self.pick.sample(pick);
-        let emitter = &self.emitters[index];
+        self.choose(pick).map(|number| self.point_on(number, u))
+    }
+
+    /// The number of an emitter.
+    #[inline(always)]
+    pub(super) fn choose(&self, pick: f64) -> Option<u32> {
+        (!self.emitters.is_empty()).then(|| self.pick.sample(pick) as u32)
+    }
+
+    /// A point on an emitter.
+    #[inline(always)]
+    pub(crate) fn point_on(&self, number: u32, u: DVec2) -> EmitterPoint {
+        let emitter = &self.emitters[number as usize];
         let uv = warp::square_to_triangle(u);
         let [a, b, c] = emitter.corners;
         let position = a * (1.0 - uv.x - uv.y) + b * uv.x + c * uv.y;
@@ -159,12 +198,12 @@ impl AreaLights {
             triangle: emitter.triangle,
             error: emitter.error,
         };
-        let mut point = emitter.at(index as u32, point);
+        let mut point = emitter.at(number, point);
         if let Some(pattern) = &emitter.pattern {
             // A path that meets the emitter by chance meets it as often as it is opaque.
             point.emission *= pattern.material.opacity_at(pattern.uv(uv));
         }
-        Some(point)
+        point
     }
 
     /// The emitter's side of a point that a path has hit, `None` when its triangle does not emit.

@@ -1,15 +1,21 @@
 //! All lights of a scene: choosing one, and a point on it.
 
+use super::choice::{Choice, Group, Place, Shape};
 use super::distant::{DistantPoint, Surroundings};
 use super::lamp::{Cone, Lamp, LampPoint};
 use super::{AreaLights, EmitterPoint, Environment, LightPoint, LightSource};
 use crate::geometry::{Mesh, SurfacePoint};
 use crate::material::Material;
 use crate::math::{Discrete, Spectrum, luminance};
+use crate::settings::LightChoice;
 use glam::{DVec2, DVec3};
 
 /// How much larger the sphere around the scene is than its bounds.
 const MARGIN: f64 = 1.0 + 1e-5;
+
+/// [`Choice::unevenness`] above which lights are chosen by place. Below, what that gains is little, as the choices of a pixel's
+/// samples are spread evenly, and is lost again by more shadow rays (benches/record/integrators.md).
+const UNEVEN: f64 = 2.0;
 
 /// All lights of a scene.
 #[derive(Debug, Clone, Default)]
@@ -24,6 +30,8 @@ pub struct Lights {
     surroundings: Surroundings,
     /// Index in `others`.
     environment: Option<usize>,
+    /// What next-event estimation goes by; `None`: by power.
+    choice: Option<Choice>,
 }
 
 /// A light that is no surface.
@@ -85,7 +93,19 @@ impl Lights {
             (false, false) => area.power() / (area.power() + pick.total()),
         };
         area.scale_densities(area_share);
-        Self { area, area_share, others, pick, surroundings, environment }
+        Self { area, area_share, others, pick, surroundings, environment, choice: None }
+    }
+
+    /// From here on next-event estimation chooses as said.
+    pub fn chosen_by(mut self, rule: LightChoice, mesh: &Mesh) -> Self {
+        self.choice = match rule {
+            LightChoice::Power => None,
+            LightChoice::Place => Choice::new(self.groups(), self.len()),
+            LightChoice::Auto => {
+                Choice::new(self.groups(), self.len()).filter(|choice| choice.unevenness(mesh) > UNEVEN)
+            }
+        };
+        self
     }
 
     /// True when nothing gives light.
@@ -126,17 +146,65 @@ impl Lights {
         self.area.kinds().chain(others)
     }
 
+    /// Lights that are chosen as one.
+    fn groups(&self) -> Vec<Group> {
+        let mut groups = self.area.groups(self.area_share);
+        groups.extend(self.others.iter().enumerate().filter_map(|(i, other)| {
+            let shape = match other {
+                Other::Lamp(lamp) => Shape::Lamp(*lamp),
+                Other::Directional { direction, irradiance } => {
+                    Shape::Directional(*direction, luminance(*irradiance))
+                }
+                Other::Environment(sky) => Shape::Sky(0.5 * sky.total()),
+            };
+            let pick = Discrete::new([1.0])?;
+            Some(Group { lights: vec![self.number(i)], pick, by_power: self.probability(i), shape })
+        }));
+        groups
+    }
+
+    /// Chooses a light for next-event estimation at a place: its number, and [`Lights::preference`] of it. `None` when there is
+    /// none. `pick` is uniform in [0,1).
+    #[inline]
+    pub fn choose_for(&self, place: impl FnOnce() -> Place, pick: f64) -> Option<(u32, f64)> {
+        match &self.choice {
+            None => self.choose(pick).map(|number| (number, 1.0)),
+            Some(choice) => Some(choice.sample(&place(), pick)),
+        }
+    }
+
+    /// How much more often than by [`LightPoint::pdf`] next-event estimation draws points of a light for a place.
+    #[inline]
+    pub fn preference(&self, place: impl FnOnce() -> Place, number: u32) -> f64 {
+        self.choice.as_ref().map_or(1.0, |choice| choice.preference(&place(), number))
+    }
+
     /// A point on some light, `None` when there is none. `pick` and `u` are uniform in [0,1).
     #[inline]
     pub fn sample(&self, pick: f64, u: DVec2) -> Option<LightPoint> {
-        if self.others.is_empty() || pick < self.area_share {
-            let pick = if self.others.is_empty() { pick } else { pick / self.area_share };
-            return self.area.sample_point(pick, u).map(LightPoint::Surface);
+        self.choose(pick).map(|number| self.point_on(number, u))
+    }
+
+    /// The number of a light, by power.
+    #[inline(always)]
+    fn choose(&self, pick: f64) -> Option<u32> {
+        if self.others.is_empty() {
+            return self.area.choose(pick);
         }
-        let index = self.pick.sample((pick - self.area_share) / (1.0 - self.area_share));
+        if pick < self.area_share {
+            return self.area.choose(pick / self.area_share);
+        }
+        Some(self.number(self.pick.sample((pick - self.area_share) / (1.0 - self.area_share))))
+    }
+
+    /// A point on a light; `u` is uniform in the unit square.
+    #[inline]
+    pub fn point_on(&self, number: u32, u: DVec2) -> LightPoint {
+        let Some(index) = (number as usize).checked_sub(self.area.len()) else {
+            return LightPoint::Surface(self.area.point_on(number, u));
+        };
         let probability = self.probability(index);
-        let number = self.number(index);
-        Some(match &self.others[index] {
+        match &self.others[index] {
             Other::Lamp(lamp) => LightPoint::Lamp(LampPoint { lamp: *lamp, probability, number }),
             &Other::Directional { direction, irradiance: radiance } => LightPoint::Distant(DistantPoint {
                 direction,
@@ -146,7 +214,7 @@ impl Lights {
                 number,
             }),
             Other::Environment(sky) => LightPoint::Distant(sky.at(sky.sample(u), probability, number)),
-        })
+        }
     }
 
     /// The emitter's side of a point that a path has hit, `None` when its triangle does not emit.

@@ -7,11 +7,13 @@ pub mod lamp;
 pub mod distant;
 pub mod environment;
 pub mod point;
+pub mod choice;
 pub mod lights;
 
 pub mod guide;
 
 pub use area::{AreaLights, EmitterPoint};
+pub use choice::Place;
 pub use environment::Environment;
 pub use guide::EmissionGuide;
 pub use lights::Lights;

@@ -142,6 +142,18 @@ choice! {
 }
 
 choice! {
+    /// How next-event estimation chooses among lights.
+    LightChoice, "light_choice", light_choice {
+        /// Whichever has less noise for the time, by how unevenly lights are spread.
+        Auto = "auto",
+        /// By about how much light each may throw on the place that asks, where there are few.
+        Place = "place",
+        /// By power.
+        Power = "power",
+    }
+}
+
+choice! {
     /// The arithmetic in which the roulette computes the probability of a light vertex.
     #[derive(Default)]
     LobePrecision, "lobe_precision", lobe_precision {

@@ -6,7 +6,8 @@ mod effects;
 mod table;
 
 pub use choices::{
-    AutoSwitch, Backend, EmbreeBuild, Heuristic, Integrator, LobePrecision, MinimumRule, Range, Switch,
+    AutoSwitch, Backend, EmbreeBuild, Heuristic, Integrator, LightChoice, LobePrecision, MinimumRule, Range,
+    Switch,
 };
 pub use effects::{Effect, EffectSet};
 pub use table::TABLE;
@@ -74,6 +75,8 @@ pub struct Settings {
     pub storing: f64,
     /// Whether the roulette judges points of lights as well.
     pub emitters: AutoSwitch,
+    /// How next-event estimation chooses among lights.
+    pub light_choice: LightChoice,
     /// Whether light subpaths are sent where earlier ones proved useful to the roulette.
     pub guiding: AutoSwitch,
     /// Whether eye samples go to the pixels that need them, where the renderer chooses their number.
@@ -125,6 +128,7 @@ impl Default for Settings {
             node_padding: 1.0,
             storing: 0.05,
             emitters: AutoSwitch::Auto,
+            light_choice: LightChoice::Auto,
             guiding: AutoSwitch::Auto,
             adaptive: Switch::On,
             outlier_rejection: Switch::Off,

@@ -1,8 +1,8 @@
 //! One row for every setting.
 
 use super::{
-    AutoSwitch, Backend, EmbreeBuild, Heuristic, Integrator, Kind, LobePrecision, MinimumRule, Range,
-    Setting, Switch,
+    AutoSwitch, Backend, EmbreeBuild, Heuristic, Integrator, Kind, LightChoice, LobePrecision, MinimumRule,
+    Range, Setting, Switch,
 };
 
 const TRANSPORT: &str = "Light transport";
@@ -256,6 +256,23 @@ pub const TABLE: &[Setting] = &[
               tries the one that a lobe points at. Of the points 'expected' are kept on average. auto: where all \
               lamps of emitting triangles (those that touch are one), point and spot lights amount to at least \
               16 of equal power.",
+    },
+    Setting {
+        name: "light_choice",
+        kind: Kind::Choice {
+            names: &LightChoice::NAMES,
+            planned: &[],
+            get: |s| s.light_choice as usize,
+            set: |s, i| s.light_choice = LightChoice::ALL[i],
+        },
+        default: "auto",
+        value_name: "NAME",
+        heading: TRANSPORT,
+        help: "How next-event estimation chooses among lights",
+        doc: "place: among up to 16 lamps (triangles that touch are one) by about how much light each may throw \
+              on the place, and by power for three tenths; among more by power. power: by power. auto: by place \
+              where by power the mean square of light straight from lamps would be over twice the square of its \
+              mean, were nothing in between.",
     },
     Setting {
         name: "guiding",

@@ -42,7 +42,11 @@ pub fn emit(
         distant: matches!(light, LightPoint::Distant(_)),
     };
     let throughput = emission.radiance * (emission.cos / (light.pdf() * pdf));
-    Walk::follow(world, rules, &start, throughput)
+    let mut walk = Walk::follow(world, rules, &start, throughput);
+    if let Some(walk) = &mut walk {
+        walk.preference = world.lights.preference(|| walk.vertex.place(), light.number());
+    }
+    walk
 }
 
 /// The light that a subpath starts from, and the point of the unit square that stands for the way it takes; `None`

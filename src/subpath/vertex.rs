@@ -3,6 +3,7 @@
 use super::World;
 use crate::bsdf::{Bsdf, Transport};
 use crate::geometry::SurfacePoint;
+use crate::light::Place;
 use crate::math::{Frame, Spectrum};
 use crate::sampler::{Purpose, Sampler};
 use glam::DVec3;
@@ -52,6 +53,13 @@ impl Vertex {
     #[inline(always)]
     pub fn cos_ng(&self, w: DVec3) -> f64 {
         self.point.ng.dot(w).abs()
+    }
+
+    /// The place for which next-event estimation chooses a light.
+    pub fn place(&self) -> Place {
+        let ng = self.point.ng;
+        let normal = if ng.dot(self.wo) >= 0.0 { ng } else { -ng };
+        Place { position: self.point.position, normal, passes: matches!(self.bsdf, Bsdf::Dielectric(_)) }
     }
 
     /// The scattering factor per geometric cosine: f |ns.w_light| / |ng.w_light|, so that a path's contribution is the

@@ -29,6 +29,8 @@ pub struct Walk {
     pub after_delta: bool,
     /// Whether the segment that led here came in from a distant light.
     pub from_afar: bool,
+    /// Light side, at the first vertex: [`Lights::preference`](crate::light::Lights::preference) of the light for it.
+    pub preference: f64,
     /// Light side: what threw light on the vertex, and on the one before it.
     pub origins: [Origin; 2],
 }
@@ -115,6 +117,7 @@ impl Walk {
             depth: 1,
             after_delta: false,
             from_afar: start.distant,
+            preference: 1.0,
             origins: [Origin::Lamp; 2],
         })
     }

@@ -31,7 +31,8 @@ impl<'a> World<'a> {
         scene.mesh.validate()?;
         Ok(Self {
             scene,
-            lights: Lights::new(&scene.mesh, &scene.materials, &scene.lights),
+            lights: Lights::new(&scene.mesh, &scene.materials, &scene.lights)
+                .chosen_by(settings.light_choice, &scene.mesh),
             camera: Camera::new(&scene.camera, (scene.film.width, scene.film.height), scene.mesh.origin)?,
             visibility: visibility::build_with(
                 settings.visibility,

@@ -136,6 +136,30 @@ pub fn lamps_over_a_glossy_floor(across: u32) -> Scene {
     in_memory(mesh, materials, DVec3::new(0.3, 0.9, 2.2), DVec3::new(0.0, 0.1, 0.0), 45.0)
 }
 
+/// Five booths with walls between them and a lamp in each, one that shines upwards as well, over floors that are white, polished,
+/// of glass, varnished and rough.
+pub fn lamps_in_booths() -> Scene {
+    let Scene { mut materials, .. } = lamps_over_a_glossy_floor(1);
+    materials[2] = Material::new("glass", Scattering::Dielectric { ior: 1.5, alpha_x: 0.2, alpha_y: 0.2 });
+    materials[5].emission = Spectrum::new(60.0, 50.0, 40.0);
+    let mut both = materials[5].clone();
+    both.two_sided_emission = true;
+    materials.push(both);
+    let mut mesh = Mesh::default();
+    for booth in 0..5u32 {
+        let middle = Vec3::new(booth as f32 - 2.0, 0.0, 0.0) * 0.6;
+        quad(&mut mesh, [[-1, 0, 1], [1, 0, 1], [1, 0, -1], [-1, 0, -1]], 0.3, middle, booth);
+        let wall = middle + Vec3::new(0.3, 0.3, 0.0);
+        quad(&mut mesh, [[0, -1, 1], [0, -1, -1], [0, 1, -1], [0, 1, 1]], 0.3, wall, 0);
+        let lamp = middle + Vec3::new(0.1, 0.45, -0.05);
+        let material = if booth == 3 { 6 } else { 5 };
+        quad(&mut mesh, [[-1, 0, -1], [1, 0, -1], [1, 0, 1], [-1, 0, 1]], 0.04, lamp, material);
+    }
+    quad(&mut mesh, [[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]], 1.5, Vec3::new(0.0, 1.0, -0.3), 0);
+    quad(&mut mesh, [[-1, 0, 1], [1, 0, 1], [1, 0, -1], [-1, 0, -1]], 1.5, Vec3::new(0.0, -0.3, 0.0), 0);
+    in_memory(mesh, materials, DVec3::new(0.3, 1.2, 2.9), DVec3::new(0.0, 0.1, 0.0), 50.0)
+}
+
 /// A point and a spot light in the box, a sun and an uneven sky in front of it.
 pub fn lights_of_every_kind() -> Vec<LightSource> {
     let sky = |i: u32| Vec3::splat(0.2 + (i % 7) as f32 * 0.3) * Vec3::new(1.0, 1.2, 1.5);
