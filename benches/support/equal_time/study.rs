@@ -2,7 +2,7 @@
 
 use hrr::material::{Material, Scattering};
 use hrr::scene::Scene;
-use hrr::settings::{AutoSwitch, Integrator, Range, Settings, Switch};
+use hrr::settings::{AutoSwitch, Integrator, LightChoice, Range, Settings, Switch};
 use hrr::subpath::World;
 use std::path::Path;
 
@@ -47,11 +47,19 @@ const REFEREE: Recipe =
 const ALL: Recipe = Recipe { name: "all", set: |s| s };
 const UNGUIDED: Recipe = Recipe { name: "guiding off", set: |s| Settings { guiding: AutoSwitch::Off, ..s } };
 const ALL_STORED: Recipe = Recipe { name: "all stored", set: |s| Settings { storing: 1.0, ..s } };
+const BY_POWER: Recipe =
+    Recipe { name: "lights by power", set: |s| Settings { light_choice: LightChoice::Power, ..s } };
 const UNSPREAD: Recipe = Recipe { name: "adaptive off", set: |s| Settings { adaptive: Switch::Off, ..s } };
 const SMALL: Recipe = Recipe { name: "small iterations", set: small };
 const PLAIN: Recipe = Recipe {
     name: "plain",
-    set: |s| Settings { guiding: AutoSwitch::Off, storing: 1.0, adaptive: Switch::Off, ..small(s) },
+    set: |s| Settings {
+        guiding: AutoSwitch::Off,
+        storing: 1.0,
+        light_choice: LightChoice::Power,
+        adaptive: Switch::Off,
+        ..small(s)
+    },
 };
 
 /// One iteration of the same size: eye subpaths are then the same, and what they find by chance cancels between recipes.
@@ -59,6 +67,8 @@ const PAIRED: Recipe = Recipe { name: "all", set: paired };
 const PAIRED_UNGUIDED: Recipe =
     Recipe { name: "guiding off", set: |s| Settings { guiding: AutoSwitch::Off, ..paired(s) } };
 const PAIRED_STORED: Recipe = Recipe { name: "all stored", set: |s| Settings { storing: 1.0, ..paired(s) } };
+const PAIRED_BY_POWER: Recipe =
+    Recipe { name: "lights by power", set: |s| Settings { light_choice: LightChoice::Power, ..paired(s) } };
 const PAIRED_PCBPT: Recipe =
     Recipe { name: "pcbpt+hrr", set: |s| Settings { integrator: Integrator::PcbptHrr, ..paired(s) } };
 
@@ -69,6 +79,7 @@ const UNADDED: Recipe = Recipe {
         integrator: Integrator::PcbptHrr,
         guiding: AutoSwitch::Off,
         storing: 1.0,
+        light_choice: LightChoice::Power,
         adaptive: Switch::Off,
         ..s
     },
@@ -131,13 +142,13 @@ pub fn of(study: &str, size: [u32; 2]) -> Option<(Vec<Variant>, Vec<Recipe>)> {
             let judged = |s: &&str| Variant { referee: Some(UNADDED), ..variant(load(s), "mirror") };
             (
                 SCENES.iter().chain(&["specular_room"]).map(judged).collect(),
-                vec![ALL, UNGUIDED, ALL_STORED, UNSPREAD, SMALL, PLAIN],
+                vec![ALL, UNGUIDED, ALL_STORED, BY_POWER, UNSPREAD, SMALL, PLAIN],
             )
         }
         // That guiding, storing and other connections keep the energy, by pairs of runs with the same eye subpaths.
         "energy" => {
             let scenes = SCENES.iter().chain(&["specular_room"]);
-            let recipes = vec![PAIRED, PAIRED_UNGUIDED, PAIRED_STORED, PAIRED_PCBPT];
+            let recipes = vec![PAIRED, PAIRED_UNGUIDED, PAIRED_STORED, PAIRED_BY_POWER, PAIRED_PCBPT];
             (scenes.map(|s| variant(load(s), "mirror")).collect(), recipes)
         }
         // How errors fall with time: in a plain room, in a scene whose caustic every recipe meets often enough for an
