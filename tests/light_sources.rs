@@ -199,16 +199,11 @@ fn lights_are_chosen_for_a_place_as_often_as_they_say() {
         .map(|number| match lights.point_on(number, rng.u2()) {
             LightPoint::Surface(e) => e.pdf_a * scene.mesh.area(e.point.triangle),
             LightPoint::Lamp(l) => l.probability,
-            LightPoint::Distant(d) => {
-                if d.delta {
-                    d.pdf
-                } else {
-                    0.0
-                }
-            }
+            LightPoint::Distant(d) if d.delta => d.pdf,
+            // The sky's density is that of its directions as well: it has the rest.
+            LightPoint::Distant(_) => 0.0,
         })
         .collect();
-    // The sky's density is that of its directions as well.
     *by_power.last_mut().unwrap() = 1.0 - by_power.iter().sum::<f64>();
     let lamp = Vec3::new(-0.5, 0.45, -0.05).as_dvec3();
     let places = [

@@ -1,7 +1,7 @@
 //! Emitting triangles: a point is picked with probability proportional to power, uniformly over the area; directions
 //! follow the cosine law. Next-event estimation and emission use the same density of points.
 
-use super::choice::{Group, Shape};
+use super::choice::{self, Group, Shape};
 use super::joined;
 use crate::geometry::{Mesh, SurfacePoint};
 use crate::material::Material;
@@ -123,14 +123,17 @@ impl AreaLights {
         self.emitters.iter_mut().for_each(|e| e.pdf_a *= share);
     }
 
-    /// Their lamps; triangles that touch are one. `share`: theirs of light picks.
-    pub(super) fn groups(&self, share: f64) -> Vec<Group> {
+    /// Their lamps; triangles that touch are one. `share`: theirs of light picks. `None` where there are too many to choose among.
+    pub(super) fn groups(&self, share: f64) -> Option<Vec<Group>> {
         let first = joined::lamps(self.emitters.iter().map(|e| e.corners));
         let mut lamps: BTreeMap<usize, Vec<u32>> = BTreeMap::new();
         for (i, lamp) in first.into_iter().enumerate() {
             lamps.entry(lamp).or_default().push(i as u32);
         }
-        lamps
+        if lamps.len() > choice::MOST {
+            return None;
+        }
+        let groups = lamps
             .into_values()
             .filter_map(|lights| {
                 let emitters = || lights.iter().map(|&i| &self.emitters[i as usize]);
@@ -149,7 +152,8 @@ impl AreaLights {
                 let shape = Shape::Area { center, radius, axis, spread, two_sided, intensity };
                 Some(Group { lights, pick, by_power, shape })
             })
-            .collect()
+            .collect();
+        Some(groups)
     }
 
     /// The sum of the squares of their lamps' shares of the light; triangles that touch are one lamp.

@@ -10,7 +10,7 @@ use glam::DVec3;
 
 /// Lamps up to which all are looked at for each choice. With more, lights are chosen by power: the roulette over their points
 /// serves these.
-const MOST: usize = 16;
+pub(super) const MOST: usize = 16;
 /// Share of the choices that go by power. With 0.1 there is more noise where the lamp that seems to be the brightest is hidden
 /// (benches/record/integrators.md).
 const BY_POWER: f64 = 0.3;

@@ -98,12 +98,11 @@ impl Lights {
 
     /// From here on next-event estimation chooses as said.
     pub fn chosen_by(mut self, rule: LightChoice, mesh: &Mesh) -> Self {
+        let by_place = || Choice::new(self.groups()?, self.len());
         self.choice = match rule {
             LightChoice::Power => None,
-            LightChoice::Place => Choice::new(self.groups(), self.len()),
-            LightChoice::Auto => {
-                Choice::new(self.groups(), self.len()).filter(|choice| choice.unevenness(mesh) > UNEVEN)
-            }
+            LightChoice::Place => by_place(),
+            LightChoice::Auto => by_place().filter(|choice| choice.unevenness(mesh) > UNEVEN),
         };
         self
     }
@@ -146,9 +145,9 @@ impl Lights {
         self.area.kinds().chain(others)
     }
 
-    /// Lights that are chosen as one.
-    fn groups(&self) -> Vec<Group> {
-        let mut groups = self.area.groups(self.area_share);
+    /// Lights that are chosen as one. `None` where there are too many.
+    fn groups(&self) -> Option<Vec<Group>> {
+        let mut groups = self.area.groups(self.area_share)?;
         groups.extend(self.others.iter().enumerate().filter_map(|(i, other)| {
             let shape = match other {
                 Other::Lamp(lamp) => Shape::Lamp(*lamp),
@@ -160,7 +159,7 @@ impl Lights {
             let pick = Discrete::new([1.0])?;
             Some(Group { lights: vec![self.number(i)], pick, by_power: self.probability(i), shape })
         }));
-        groups
+        Some(groups)
     }
 
     /// Chooses a light for next-event estimation at a place: its number, and [`Lights::preference`] of it. `None` when there is
