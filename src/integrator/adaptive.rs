@@ -1,13 +1,9 @@
 //! What an integrator that adapts remembers, and what it makes of that.
 
-use super::Size;
-use super::balance::{Costs, Known};
 use super::spread::{PixelPlan, Spread};
 use super::watched::{PixelSums, Watched, work};
-use crate::film::{Film, FilmSettings};
-use crate::math::{Spectrum, luminance};
+use crate::film::FilmSettings;
 use crate::tally::Tally;
-use glam::DVec2;
 
 /// Most light vertices that the query which kept one should keep, on average over all that are kept: the price of more is that
 /// of a query, and what they bring ever less. Where vertices are dense, in a caustic that light is guided to, queries keep many
@@ -18,13 +14,8 @@ const KEPT: f64 = 8.0;
 #[derive(Debug)]
 pub(super) struct Adaptive {
     watched: Watched,
-    /// Squares of what the camera saw of light vertices in the last iteration.
-    splats: Film,
-    size: Size,
-    /// What the visit of a node costs, over all that a sample costs without the roulette; and the mean of what a sample cost,
-    /// in the same unit.
+    /// What the visit of a node costs, over all that a sample costs without the roulette.
     visit: f64,
-    sample: f64,
     /// Factor on how many light vertices the roulette keeps.
     kept: f64,
     spread: Option<Spread>,
@@ -33,15 +24,7 @@ pub(super) struct Adaptive {
 impl Adaptive {
     /// Nothing so far.
     pub fn new(film: &FilmSettings) -> Self {
-        Self {
-            watched: Watched::new(film.width, film.height),
-            splats: Film::new(film),
-            size: Size { samples: 1, light_subpaths: 1 },
-            visit: 0.0,
-            sample: 1.0,
-            kept: 1.0,
-            spread: None,
-        }
+        Self { watched: Watched::new(film.width, film.height), visit: 0.0, kept: 1.0, spread: None }
     }
 
     /// What a pixel gets in an iteration of `samples`.
@@ -52,16 +35,6 @@ impl Adaptive {
     /// Factor on how many light vertices the roulette should keep.
     pub fn kept(&self) -> f64 {
         self.kept
-    }
-
-    /// Forgets the light side of the last iteration, for one of this size.
-    pub fn begin(&mut self, film: &FilmSettings, size: Size) {
-        (self.splats, self.size) = (Film::new(film), size);
-    }
-
-    /// Learns that the camera saw a light vertex. From any thread.
-    pub fn splat(&self, raster: DVec2, value: Spectrum) {
-        self.splats.add(raster, value * value);
     }
 
     /// Learns from a part of an iteration's eye samples.
@@ -77,7 +50,6 @@ impl Adaptive {
         let visit = tally.playing / tally.played_work.max(1.0);
         // What is timed in some places only may seem to be more than all.
         let rest = (all - visit * work(tally)).max(0.1 * all).max(1e-9);
-        self.sample = all / rest;
         self.visit = visit / rest * tally.camera_rays.max(1) as f64;
     }
 
@@ -90,24 +62,5 @@ impl Adaptive {
     /// Plans iterations to come.
     pub fn plan(&mut self, samples: u32) {
         self.spread = self.watched.plan(samples, self.visit);
-    }
-
-    /// The share of an iteration's time that its light side should have; `None` while too little is known.
-    pub fn light_share(&self, costs: &Costs) -> Option<f64> {
-        let needs = self.watched.needs()?;
-        let samples = f64::from(self.size.samples);
-        let splats: Vec<f64> = (0..self.splats.height())
-            .flat_map(|y| self.splats.row(y))
-            .map(|squares| luminance(squares) / (samples * samples))
-            .collect();
-        let known = Known {
-            needs: &needs,
-            splats: &splats,
-            width: self.watched.width,
-            light_subpaths: self.size.light_subpaths as f64,
-            visit: self.visit,
-            sample: self.sample,
-        };
-        known.light_share(costs)
     }
 }

@@ -1,7 +1,6 @@
 //! The bidirectional machine: light pass, vertex BVH, eye pass. What it does in each is a [`Recipe`].
 
 use super::adaptive::Adaptive;
-use super::balance::Costs;
 use super::emitters::EmitterPoints;
 use super::merging;
 use super::recipe::{Base, Merge, Recipe};
@@ -180,10 +179,6 @@ impl Integrator for Bidirectional<'_> {
         }
     }
 
-    fn light_share(&self, costs: &Costs) -> Option<f64> {
-        self.adaptive.as_ref()?.light_share(costs)
-    }
-
     fn finish_by(&mut self, deadline: Instant) {
         // Each eye sample has a light subpath of its own: there are no more of them than planned.
         self.deadline = (self.recipe.base != Base::OwnPath).then_some(deadline);
@@ -198,9 +193,6 @@ impl Integrator for Bidirectional<'_> {
             light_subpaths: self.size.light_subpaths as f64,
             radius: radius / f64::from(samples).sqrt(),
         });
-        if let Some(adaptive) = &mut self.adaptive {
-            adaptive.begin(&self.world.scene.film, self.size);
-        }
         let on_light_side = |fraction| progress(LIGHT_SHARE * fraction);
         let mut tally = self.light_pass(Stream::Light, iteration, Some(film), &on_light_side);
         self.order_picks();

@@ -157,9 +157,6 @@ impl Bidirectional<'_> {
                         && tally.connection(!world.visibility.occluded(&ray))
                     {
                         film.add(raster, value);
-                        if let Some(adaptive) = &self.adaptive {
-                            adaptive.splat(raster, value);
-                        }
                     }
                 }
                 walk = self.techniques.next_light(world, &light, &sampler);

@@ -6,7 +6,6 @@ pub mod plan;
 pub mod path;
 pub mod bidirectional;
 mod adaptive;
-mod balance;
 mod emitters;
 mod eye_pass;
 mod guiding;
@@ -18,7 +17,6 @@ mod spread;
 mod tile;
 mod watched;
 
-pub use balance::Costs;
 pub use plan::Plan;
 pub use recipe::{Merge, Recipe};
 
@@ -61,12 +59,6 @@ pub trait Integrator {
     /// From now on, eye samples of an iteration go to the pixels that need them, as those before showed. Iterations then
     /// depend on those before.
     fn adapt(&mut self) {}
-
-    /// The share of an iteration's time that its light subpaths should have, as iterations before showed; `None` while that
-    /// is not known.
-    fn light_share(&self, _costs: &Costs) -> Option<f64> {
-        None
-    }
 
     /// The next iteration should be over by then, with fewer or more eye samples than its size says, if need be; what it
     /// counts for stays as it is. Iterations then depend on the clock.

@@ -128,7 +128,7 @@ impl Watched {
             return None;
         }
         let each: Vec<Need> = self.pixels.iter().map(PixelSums::need).collect();
-        Some(around(&each, self.width, Around::add).into_iter().map(|(all, n)| all.mean(n)).collect())
+        Some(around(&each, self.width))
     }
 }
 
@@ -159,21 +159,21 @@ impl Around {
     }
 }
 
-/// Sums over the square around each pixel, and how many pixels of it there are.
-pub(super) fn around<T, S: Default>(each: &[T], width: usize, add: impl Fn(&mut S, &T)) -> Vec<(S, f64)> {
+/// The needs of the square around each pixel.
+fn around(each: &[Need], width: usize) -> Vec<Need> {
     let height = each.len() / width.max(1);
     (0..each.len())
         .map(|i| {
             let (x, y) = (i % width, i / width);
             let range = |at: usize, size: usize| at.saturating_sub(AROUND)..(at + AROUND + 1).min(size);
-            let (mut sum, mut count) = (S::default(), 0.0);
+            let (columns, mut all, mut count) = (range(x, width), Around::default(), 0.0);
             for row in range(y, height) {
-                for value in &each[row * width..][range(x, width)] {
-                    add(&mut sum, value);
+                for need in &each[row * width..][columns.clone()] {
+                    all.add(need);
                     count += 1.0;
                 }
             }
-            (sum, count)
+            all.mean(count)
         })
         .collect()
 }

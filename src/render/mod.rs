@@ -129,8 +129,7 @@ fn run(scene: &Scene, settings: &Settings, observer: &dyn Observer) -> Result<Ou
         bytes = (bytes.0.max(cache), bytes.1.max(tree));
         if let Some(sizing) = &sizing {
             let measured = Measured { size, tally: done, bytes: cache + tree };
-            let share = |costs: &_| integrator.light_share(costs);
-            let Some(next) = sizing.next(start.elapsed().as_secs_f64(), &measured, &share) else { break };
+            let Some(next) = sizing.next(start.elapsed().as_secs_f64(), &measured) else { break };
             integrator.finish_by(Instant::now() + Duration::from_secs_f64(next.seconds));
             size = next.size;
             integrator.resize(size)?;

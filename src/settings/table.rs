@@ -304,9 +304,8 @@ pub const TABLE: &[Setting] = &[
         heading: TRANSPORT,
         help: "Whether noisy pixels get more of the eye samples (--time without --samples)",
         doc: "on: samples, and the roulette's queries, go where earlier iterations showed that they lower the \
-              relative error most; light subpaths get the share of the time that does so, and 'expected' is \
-              lowered where over 8 light vertices are kept beside one that is. off: to all pixels alike, and three \
-              tenths of the time.",
+              relative error most, and 'expected' is lowered where over 8 light vertices are kept beside one that \
+              is. off: to all pixels alike.",
     },
     Setting {
         name: "outlier_rejection",
