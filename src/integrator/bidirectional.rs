@@ -25,8 +25,9 @@ use std::time::Instant;
 /// Samples of a pixel that the roulette's pairs count for as if each had light vertices of its own. More of them share the
 /// vertices, though not the pairs; measured in benches/record/integrators.md.
 const SHARERS: f64 = 8.0;
-/// Share of an iteration's progress that the light side stands for.
-const LIGHT_SHARE: f64 = 0.3;
+/// Share of an iteration's time that the light side should have, and of its progress that it stands for
+/// (benches/record/integrators.md).
+pub(crate) const LIGHT_SHARE: f64 = 0.2;
 
 /// The machine, and the memory that it keeps between iterations.
 pub struct Bidirectional<'a> {

@@ -17,6 +17,7 @@ mod spread;
 mod tile;
 mod watched;
 
+pub(crate) use bidirectional::LIGHT_SHARE;
 pub use plan::Plan;
 pub use recipe::{Merge, Recipe};
 

@@ -13,7 +13,7 @@ const LEAST_SHARE: f64 = 0.1;
 
 /// What a pixel's samples are worth, played as they best are.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Play {
+struct Play {
     /// Share that plays the roulette.
     pub share: f64,
     /// Variance of one sample.

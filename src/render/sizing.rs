@@ -8,7 +8,7 @@
 
 use super::counters::machine_bytes;
 use crate::film::FilmSettings;
-use crate::integrator::{Merge, Recipe, Size};
+use crate::integrator::{LIGHT_SHARE, Merge, Recipe, Size};
 use crate::settings::Settings;
 use crate::tally::Tally;
 
@@ -17,8 +17,6 @@ const PILOT: (f64, f64, f64) = (0.04, 0.2, 10.0);
 /// How many times longer than the preview, of one sample, it should be; and the share of the time that this may take.
 const TELLING: f64 = 5.0;
 const MOST_PILOT: f64 = 0.2;
-/// Share of an iteration's time that its light side gets.
-const LIGHT: f64 = 0.2;
 /// Share of the time that is not worth another iteration.
 const REST: f64 = 0.02;
 /// Where only the number of samples is open, iterations to divide the time into: so that there is something to show.
@@ -125,22 +123,27 @@ impl Sizing {
         let size = match self.open {
             Open::Both => {
                 let subpaths =
-                    self.most_subpaths(last).min(LIGHT * seconds / per_subpath.max(1e-12)).max(1.0);
+                    self.most_subpaths(last).min(LIGHT_SHARE * seconds / per_subpath.max(1e-12)).max(1.0);
                 match self.playing(last) {
                     // In the same proportion where memory is short.
-                    0.0 => self.size((1.0 / LIGHT - 1.0) * subpaths * per_subpath / per_sample, subpaths),
+                    0.0 => {
+                        self.size((1.0 / LIGHT_SHARE - 1.0) * subpaths * per_subpath / per_sample, subpaths)
+                    }
                     playing => {
                         // As many samples as before at least, each with as many times the work as there are light subpaths.
                         let last_subpaths = last.size.light_subpaths as f64;
                         let least = per_sample * f64::from(last.size.samples);
-                        let most = 1.0 + ((1.0 - LIGHT) * seconds / least - 1.0) / playing;
+                        let most = 1.0 + ((1.0 - LIGHT_SHARE) * seconds / least - 1.0) / playing;
                         let wanted = subpaths / last_subpaths;
                         let growth = wanted.min(most.max(1.0));
                         let light_side = growth * last_subpaths * per_subpath;
                         let rest = seconds - light_side;
                         // In the same proportion where memory is short, as above.
-                        let eye =
-                            if growth < wanted { rest } else { rest.min((1.0 / LIGHT - 1.0) * light_side) };
+                        let eye = if growth < wanted {
+                            rest
+                        } else {
+                            rest.min((1.0 / LIGHT_SHARE - 1.0) * light_side)
+                        };
                         let samples = eye / (per_sample * (1.0 + playing * (growth - 1.0)));
                         self.size(samples, growth * last_subpaths)
                     }
@@ -251,7 +254,7 @@ mod tests {
         let (last, weight) = sizes[1];
         assert_eq!(sizes.len(), 2, "{sizes:?}");
         let ratio = last.light_subpaths as f64 * 1e-6 / (f64::from(last.samples) * 0.05);
-        assert!((ratio * (1.0 / LIGHT - 1.0) - 1.0).abs() < 0.02, "{ratio}");
+        assert!((ratio * (1.0 / LIGHT_SHARE - 1.0) - 1.0).abs() < 0.02, "{ratio}");
         assert!(last.light_subpaths > 7_000_000 && weight > 700);
     }
 
