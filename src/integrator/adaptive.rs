@@ -18,13 +18,21 @@ pub(super) struct Adaptive {
     visit: f64,
     /// Factor on how many light vertices the roulette keeps.
     kept: f64,
+    /// By what the last iteration would have that lowered.
+    lower: f64,
     spread: Option<Spread>,
 }
 
 impl Adaptive {
     /// Nothing so far.
     pub fn new(film: &FilmSettings) -> Self {
-        Self { watched: Watched::new(film.width, film.height), visit: 0.0, kept: 1.0, spread: None }
+        Self {
+            watched: Watched::new(film.width, film.height),
+            visit: 0.0,
+            kept: 1.0,
+            lower: 1.0,
+            spread: None,
+        }
     }
 
     /// What a pixel gets in an iteration of `samples`.
@@ -54,13 +62,45 @@ impl Adaptive {
     }
 
     /// Learns how many light vertices the roulette kept.
-    pub fn moderate(&mut self, tally: &Tally) {
+    pub fn learn_kept(&mut self, tally: &Tally) {
         let [accepted, squares] = [tally.roulette.accepted, tally.kept_squares].map(|n| n as f64);
-        self.kept *= (KEPT * accepted / squares.max(1.0)).min(1.0);
+        self.lower = (KEPT * accepted / squares.max(1.0)).min(1.0);
+    }
+
+    /// Has the roulette keep fewer, where the last iteration kept many. For iterations that are larger than that: among those
+    /// of one size the ones that followed kept too few in caustics (benches/record/integrators.md).
+    pub fn moderate(&mut self) {
+        self.kept *= self.lower;
+        self.lower = 1.0;
     }
 
     /// Plans iterations to come.
     pub fn plan(&mut self, samples: u32) {
         self.spread = self.watched.plan(samples, self.visit);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::film::Filter;
+    use crate::roulette::QueryCounters;
+
+    fn kept(beside: u64) -> Tally {
+        let roulette = QueryCounters { accepted: 100, ..QueryCounters::default() };
+        Tally { roulette, kept_squares: 100 * beside, ..Tally::default() }
+    }
+
+    #[test]
+    fn fewer_are_kept_once_for_each_iteration_that_kept_many() {
+        let mut adaptive = Adaptive::new(&FilmSettings { width: 4, height: 4, filter: Filter::Box });
+        adaptive.learn_kept(&kept(32));
+        assert_eq!(adaptive.kept(), 1.0);
+        adaptive.moderate();
+        adaptive.moderate();
+        assert_eq!(adaptive.kept(), 0.25);
+        adaptive.learn_kept(&kept(4));
+        adaptive.moderate();
+        assert_eq!(adaptive.kept(), 0.25, "few are no reason to keep more");
     }
 }

@@ -25,6 +25,8 @@ use std::time::Instant;
 /// Samples of a pixel that the roulette's pairs count for as if each had light vertices of its own. More of them share the
 /// vertices, though not the pairs; measured in benches/record/integrators.md.
 const SHARERS: f64 = 8.0;
+/// How many times the pairs of the last iteration one has that the roulette keeps fewer light vertices in, if that kept many.
+const LARGER: u64 = 2;
 /// Share of an iteration's time that the light side should have, and of its progress that it stands for
 /// (benches/record/integrators.md).
 pub(crate) const LIGHT_SHARE: f64 = 0.2;
@@ -159,6 +161,10 @@ impl Integrator for Bidirectional<'_> {
     fn resize(&mut self, size: Size) -> Result<()> {
         let film = &self.world.scene.film;
         let all = u64::from(film.width) * u64::from(film.height) * u64::from(size.samples);
+        let pairs = |size: &Size| u64::from(size.samples) * size.light_subpaths;
+        if let Some(adaptive) = self.adaptive.as_mut().filter(|_| pairs(&size) > LARGER * pairs(&self.size)) {
+            adaptive.moderate();
+        }
         self.size = Size {
             light_subpaths: if self.recipe.base == Base::OwnPath { all } else { size.light_subpaths },
             ..size
@@ -209,7 +215,7 @@ impl Integrator for Bidirectional<'_> {
         let whole = self.eye_pass(iteration, film, &on_eye_side, &mut tally);
         tally.sides[1] = start.elapsed().as_secs_f64() * whole;
         if let Some(adaptive) = &mut self.adaptive {
-            adaptive.moderate(&tally);
+            adaptive.learn_kept(&tally);
         }
         film.count_samples(u64::from(self.size.samples));
         Ok(tally)
