@@ -304,8 +304,8 @@ pub const TABLE: &[Setting] = &[
         heading: TRANSPORT,
         help: "Whether noisy pixels get more of the eye samples (--time without --samples)",
         doc: "on: samples, and the roulette's queries, go where earlier iterations showed that they lower the \
-              relative error most, and 'expected' is lowered where over 8 light vertices are kept beside one that \
-              is. off: to all pixels alike.",
+              relative error most, and 'expected' is lowered for larger iterations where over 8 light vertices were \
+              kept beside one that was. off: to all pixels alike.",
     },
     Setting {
         name: "outlier_rejection",
